@@ -1,0 +1,1 @@
+//! Builders that open each service with its one quality of service.

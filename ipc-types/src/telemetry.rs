@@ -1,0 +1,106 @@
+//! What the executor tells about itself.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
+
+use crate::{JointArray, PlanId, assert_layout, wire_enum};
+
+wire_enum! {
+    /// What the executor is doing.
+    Mode {
+        /// Waits for a fresh state of a healthy endpoint.
+        Init = 0 => "init",
+        /// Holds a position.
+        Hold = 1 => "hold",
+        /// Executes a plan.
+        Executing = 2 => "executing",
+        /// Has slowed down to a stand-still on the path and keeps the plan.
+        Paused = 3 => "paused",
+        /// Slows down on the path and drops the plan.
+        Stopping = 4 => "stopping",
+        /// Holds, latched, until an explicit reset.
+        Fault = 5 => "fault",
+    }
+}
+
+wire_enum! {
+    /// Why the executor is in [`Mode::Fault`], or why it stopped.
+    Fault {
+        /// None.
+        None = 0 => "none",
+        /// No fresh joint state: the arm was stopped on its path.
+        StaleState = 1 => "joint state is stale",
+        /// No joint state at all for the communication budget.
+        CommunicationLost = 2 => "communication with the hardware endpoint was lost",
+        /// The endpoint halted its motors.
+        Halted = 3 => "the hardware endpoint halted",
+        /// The endpoint is not calibrated.
+        NotCalibrated = 4 => "the hardware endpoint is not calibrated",
+        /// The endpoint reports an error or stopped by itself.
+        Endpoint = 5 => "the hardware endpoint reports an error",
+        /// Commanded and measured positions are too far apart.
+        FollowingError = 6 => "following error",
+        /// A setpoint would have left the soft limits.
+        SoftLimit = 7 => "soft limit",
+        /// A setpoint would have stepped further than v·T.
+        Step = 8 => "setpoint step above the velocity limit",
+        /// A measured or computed value is not finite.
+        NotFinite = 9 => "a joint value is not finite",
+        /// The mean rate fell below the bound.
+        LowRate = 10 => "the loop's mean rate is too low",
+        /// A state has another number of joints than the arm.
+        JointCount = 11 => "the joint state has another number of joints",
+        /// An operator asked for a stop.
+        Operator = 12 => "stopped by the operator",
+    }
+}
+
+/// How many buckets a latency histogram has; bucket `i` counts values below
+/// [`bucket_upper_ns`]`(i)`, the last one everything else.
+pub const HISTOGRAM_BUCKETS: usize = 32;
+
+/// The upper bound of a histogram bucket: 2^(i/2 + 8) ns rounded down, 256 ns to 12 ms. [ns]
+#[must_use]
+pub const fn bucket_upper_ns(bucket: usize) -> u64 {
+    let octave = 256u64 << (bucket / 2);
+    if bucket % 2 == 0 { octave } else { octave + octave * 414 / 1000 }
+}
+
+/// A snapshot of the executor, about 100 Hz.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("nullsweep.Telemetry.v1")]
+pub struct Telemetry {
+    /// Rises by one each sample.
+    pub sequence: u64,
+    /// When the snapshot was taken. [ns]
+    pub stamp_ns: u64,
+    /// Cycles since the loop was armed.
+    pub cycle: u64,
+    /// Deadlines that the loop missed since it was armed.
+    pub missed_cycles: u64,
+    /// The plan in execution, [`PlanId::NONE`] for none.
+    pub plan: PlanId,
+    /// Time within that plan. [ns]
+    pub plan_time_ns: u64,
+    /// Speed scale in force, 0…1.
+    pub speed_scale: f64,
+    /// Commanded positions. [rad] or [m]
+    pub commanded: JointArray,
+    /// Newest measured positions. [rad] or [m]
+    pub measured: JointArray,
+    /// Histogram of wake-up lateness, see [`bucket_upper_ns`].
+    pub lateness: [u32; HISTOGRAM_BUCKETS],
+    /// Histogram of compute time a cycle.
+    pub compute: [u32; HISTOGRAM_BUCKETS],
+    /// How many joints are used.
+    pub joint_count: u32,
+    /// A [`Mode`] on the wire.
+    pub mode: u32,
+    /// A [`Fault`] on the wire.
+    pub fault: u32,
+    /// The knot whose segment is being executed.
+    pub knot: u32,
+}
+assert_layout!(Telemetry, 592);
