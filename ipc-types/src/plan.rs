@@ -7,15 +7,16 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::{JointArray, MAX_HELD_JOINTS, MAX_KNOTS, assert_layout, wire_enum};
 
-/// Names one published plan: the publisher's epoch (its start on `CLOCK_MONOTONIC`, ns) and a
-/// counter within it. A restarted planner never repeats an id. Zero means "no plan".
+/// Names one published plan: when it was published (`CLOCK_MONOTONIC`, ns) and a counter within its
+/// publisher. No id is ever repeated, and an executor never starts a plan whose epoch lies before
+/// its own start. Zero means "no plan".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("nullsweep.PlanId.v1")]
 pub struct PlanId {
-    /// Start of the publishing process. [ns, `CLOCK_MONOTONIC`]
+    /// When it was published. [ns, `CLOCK_MONOTONIC`]
     pub epoch: u64,
-    /// Counts that process's plans from 1.
+    /// Counts that publisher's plans from 1.
     pub number: u64,
 }
 assert_layout!(PlanId, 16);

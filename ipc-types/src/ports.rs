@@ -1,1 +1,0 @@
-//! Builders that open each service with its one quality of service.
