@@ -63,7 +63,7 @@ assert_layout!(Command, 16);
 #[repr(C)]
 #[type_name("nullsweep.Response.v1")]
 pub struct Response {
-    /// When it was answered. [ns]
+    /// When it was answered. \[ns\]
     pub stamp_ns: u64,
     /// The plan in execution, [`PlanId::NONE`] for none.
     pub plan: PlanId,

@@ -77,7 +77,7 @@ wire_enum! {
 pub struct PlanEvent {
     /// Rises by one each event.
     pub sequence: u64,
-    /// When it happened. [ns]
+    /// When it happened. \[ns\]
     pub stamp_ns: u64,
     /// Which plan.
     pub plan: PlanId,

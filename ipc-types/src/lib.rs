@@ -45,7 +45,7 @@ pub const MAX_HELD_JOINTS: usize = 32;
 /// Most knots of one plan: 4.5 MB, so that four publishers fit Docker's 64 MB of shared memory.
 pub const MAX_KNOTS: usize = 16_384;
 
-/// One value for each joint of the arm; entries past the joint count are zero. [rad] or [m]
+/// One value for each joint of the arm; entries past the joint count are zero. \[rad\] or \[m\]
 pub type JointArray = [f64; MAX_JOINTS];
 
 /// Makes a fieldless enum that crosses the wire as a `u32`, with a checked way back.

@@ -14,7 +14,7 @@ use crate::{JointArray, MAX_HELD_JOINTS, MAX_KNOTS, assert_layout, wire_enum};
 #[repr(C)]
 #[type_name("nullsweep.PlanId.v1")]
 pub struct PlanId {
-    /// When it was published. [ns, `CLOCK_MONOTONIC`]
+    /// When it was published. \[ns, `CLOCK_MONOTONIC`\]
     pub epoch: u64,
     /// Counts that publisher's plans from 1.
     pub number: u64,
@@ -76,11 +76,11 @@ wire_enum! {
 #[repr(C)]
 #[type_name("nullsweep.Knot.v1")]
 pub struct Knot {
-    /// Time since the plan's start. [ns]
+    /// Time since the plan's start. \[ns\]
     pub time_from_start_ns: u64,
-    /// Joint positions; continuous joints are unwrapped along the whole plan. [rad] or [m]
+    /// Joint positions; continuous joints are unwrapped along the whole plan. \[rad\] or \[m\]
     pub positions: JointArray,
-    /// Joint velocities, used by [`Interpolation::Cubic`], else zero. [rad/s] or [m/s]
+    /// Joint velocities, used by [`Interpolation::Cubic`], else zero. \[rad/s\] or \[m/s\]
     pub velocities: JointArray,
     /// The patch that this knot sweeps, `u32::MAX` for none.
     pub patch: u32,
@@ -109,10 +109,10 @@ pub struct PlanHeader {
     pub checksum: u64,
     /// Fingerprint of the tool that the plan was made for; for the record.
     pub tool: u64,
-    /// The robot's root frame in the frame that the planner was given: x, y, z [m] and the unit
+    /// The robot's root frame in the frame that the planner was given: x, y, z \[m\] and the unit
     /// quaternion x, y, z, w. For the record: the executor knows no geometry.
     pub base_pose: [f64; 7],
-    /// Positions of the held joints that the plan was checked with. [rad] or [m]
+    /// Positions of the held joints that the plan was checked with. \[rad\] or \[m\]
     pub held_positions: [f64; MAX_HELD_JOINTS],
     /// How many of `held_positions` are used.
     pub held_count: u32,

@@ -14,15 +14,15 @@ use crate::{JointArray, PlanId, assert_layout};
 pub struct Setpoint {
     /// Rises by one each cycle. A reader that skips samples judges steps by v·T·Δsequence.
     pub sequence: u64,
-    /// When the executor made it. [ns]
+    /// When the executor made it. \[ns\]
     pub stamp_ns: u64,
-    /// When the next one is due. [ns]
+    /// When the next one is due. \[ns\]
     pub deadline_ns: u64,
     /// The plan that is being executed, [`PlanId::NONE`] while holding without one.
     pub plan: PlanId,
-    /// Commanded positions. [rad] or [m]
+    /// Commanded positions. \[rad\] or \[m\]
     pub positions: JointArray,
-    /// Commanded velocities, feed-forward for the endpoint's servo. [rad/s] or [m/s]
+    /// Commanded velocities, feed-forward for the endpoint's servo. \[rad/s\] or \[m/s\]
     pub velocities: JointArray,
     /// How many joints are used.
     pub joint_count: u32,

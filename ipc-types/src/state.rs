@@ -25,19 +25,19 @@ pub mod status {
 pub struct JointStates {
     /// Rises by one each sample.
     pub sequence: u64,
-    /// When the joints were measured. [ns]
+    /// When the joints were measured. \[ns\]
     pub stamp_ns: u64,
     /// The newest setpoint that was in force when the joints were measured, 0 for none.
     pub setpoint_sequence: u64,
-    /// When that setpoint reached the endpoint. [ns]
+    /// When that setpoint reached the endpoint. \[ns\]
     pub setpoint_received_ns: u64,
-    /// Measured positions. [rad] or [m]
+    /// Measured positions. \[rad\] or \[m\]
     pub positions: JointArray,
-    /// Measured velocities. [rad/s] or [m/s]
+    /// Measured velocities. \[rad/s\] or \[m/s\]
     pub velocities: JointArray,
-    /// Measured efforts. [N·m] or [N]
+    /// Measured efforts. \[N·m\] or \[N\]
     pub efforts: JointArray,
-    /// Positions of the joints that a plan takes as fixed, in the URDF's order. [rad] or [m]
+    /// Positions of the joints that a plan takes as fixed, in the URDF's order. \[rad\] or \[m\]
     pub held_positions: [f64; MAX_HELD_JOINTS],
     /// How many of `held_positions` are used.
     pub held_count: u32,

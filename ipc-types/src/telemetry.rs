@@ -60,11 +60,11 @@ wire_enum! {
 /// [`bucket_upper_ns`]`(i)`, the last one everything else.
 pub const HISTOGRAM_BUCKETS: usize = 32;
 
-/// The upper bound of a histogram bucket: 2^(i/2 + 8) ns rounded down, 256 ns to 12 ms. [ns]
+/// The upper bound of a histogram bucket: 2^(i/2 + 8) ns rounded down, 256 ns to 12 ms. \[ns\]
 #[must_use]
 pub const fn bucket_upper_ns(bucket: usize) -> u64 {
     let octave = 256u64 << (bucket / 2);
-    if bucket % 2 == 0 { octave } else { octave + octave * 414 / 1000 }
+    if bucket.is_multiple_of(2) { octave } else { octave + octave * 414 / 1000 }
 }
 
 /// A snapshot of the executor, about 100 Hz.
@@ -74,7 +74,7 @@ pub const fn bucket_upper_ns(bucket: usize) -> u64 {
 pub struct Telemetry {
     /// Rises by one each sample.
     pub sequence: u64,
-    /// When the snapshot was taken. [ns]
+    /// When the snapshot was taken. \[ns\]
     pub stamp_ns: u64,
     /// Cycles since the loop was armed.
     pub cycle: u64,
@@ -82,13 +82,13 @@ pub struct Telemetry {
     pub missed_cycles: u64,
     /// The plan in execution, [`PlanId::NONE`] for none.
     pub plan: PlanId,
-    /// Time within that plan. [ns]
+    /// Time within that plan. \[ns\]
     pub plan_time_ns: u64,
     /// Speed scale in force, 0…1.
     pub speed_scale: f64,
-    /// Commanded positions. [rad] or [m]
+    /// Commanded positions. \[rad\] or \[m\]
     pub commanded: JointArray,
-    /// Newest measured positions. [rad] or [m]
+    /// Newest measured positions. \[rad\] or \[m\]
     pub measured: JointArray,
     /// Histogram of wake-up lateness, see [`bucket_upper_ns`].
     pub lateness: [u32; HISTOGRAM_BUCKETS],

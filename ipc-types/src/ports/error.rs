@@ -67,9 +67,9 @@ pub enum IpcError {
         "/dev/shm has {free} bytes free, {need} are needed; in Docker, raise it with `--shm-size`"
     )]
     SharedMemoryFull {
-        /// [bytes]
+        /// \[bytes\]
         need: u64,
-        /// [bytes]
+        /// \[bytes\]
         free: u64,
     },
     /// Others kept creating and removing it, or a crash left it half made.
@@ -114,7 +114,7 @@ pub enum IpcError {
     NoAnswer {
         /// The robot's name.
         robot: String,
-        /// How long was waited. [ms]
+        /// How long was waited. \[ms\]
         millis: u128,
     },
     /// Sending or receiving failed.

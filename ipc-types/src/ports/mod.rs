@@ -208,7 +208,7 @@ fn retry<T, E: Into<Cause>>(
     }
 }
 
-/// An error where less shared memory is free than `need`. [bytes]
+/// An error where less shared memory is free than `need`. \[bytes\]
 fn need_shared_memory(need: u64) -> Result<(), IpcError> {
     match free_shared_memory() {
         Some(free) if free < need => Err(IpcError::SharedMemoryFull { need, free }),
