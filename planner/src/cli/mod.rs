@@ -1,0 +1,72 @@
+//! The command line of `planner`.
+
+mod bars;
+mod inspect;
+mod plan;
+mod publish;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Everything went well.
+pub const OK: u8 = 0;
+/// Bad input, no plan, no executor, a rejection.
+pub const FAILED: u8 = 1;
+/// The command line was wrong (clap's own code).
+pub const USAGE: u8 = 2;
+/// A plan was made but breaks a rule, so it was not written.
+pub const VIOLATIONS: u8 = 3;
+
+/// Plans how a redundant arm sweeps a scanned surface, and publishes the plan.
+#[derive(Debug, Parser)]
+#[command(name = "planner", version, after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule and was not written.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make a plan from scans, or from a simulated scan.
+    Plan(Box<plan::PlanArgs>),
+    /// Send a plan to the executor.
+    Publish(publish::PublishArgs),
+    /// Say what a plan file holds.
+    Inspect(inspect::InspectArgs),
+}
+
+/// Runs the command line and returns the process's exit code.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(e) => {
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { USAGE } else { OK });
+        }
+    };
+    let result = match cli.command {
+        Command::Plan(args) => plan::run(&args),
+        Command::Publish(args) => publish::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+    };
+    match result {
+        Ok(code) => ExitCode::from(code),
+        Err(e) => {
+            eprintln!("planner: {e:#}");
+            ExitCode::from(FAILED)
+        }
+    }
+}
+
+/// Writes pretty JSON to a file, or to standard output for `-`.
+fn write_json<T: serde::Serialize>(value: &T, to: &std::path::Path) -> anyhow::Result<()> {
+    use anyhow::Context;
+    let text = serde_json::to_string_pretty(value)?;
+    if to == std::path::Path::new("-") {
+        println!("{text}");
+        return Ok(());
+    }
+    std::fs::write(to, text + "\n").with_context(|| format!("cannot write {}", to.display()))
+}

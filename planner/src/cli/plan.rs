@@ -1,0 +1,469 @@
+//! `planner plan`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nullsweep_robot::{ArmSpec, JointVector, MAX_DOF, Robot, Side};
+
+use super::bars::Bars;
+use super::{OK, VIOLATIONS, write_json};
+use crate::collision::Obstacle;
+use crate::cost::CostKind;
+use crate::formulation::{FormulationConfig, Method};
+use crate::graph::GraphConfig;
+use crate::patches::PatchConfig;
+use crate::pipeline::{self, After, Figures, Job, Outcome, StanceChoice};
+use crate::plan::Plan;
+use crate::progress::Progress;
+use crate::scan::{self, CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan};
+use crate::simulate;
+use crate::stance::{Stance, StanceSearch};
+use crate::tool::Tool;
+
+#[derive(Debug, Args)]
+pub(super) struct PlanArgs {
+    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ.
+    #[arg(required_unless_present = "demo", conflicts_with = "demo")]
+    scans: Vec<PathBuf>,
+    /// Plan for a simulated scan instead.
+    #[arg(long, value_enum)]
+    demo: Option<Demo>,
+
+    /// Pose of a scan's sensor in the floor frame: x,y,z,qx,qy,qz,qw; once for each scan.
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    sensor_pose: Vec<Numbers<7>>,
+    /// Direction against gravity in the scans' frame: x,y,z.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with = "sensor_pose")]
+    up: Option<Numbers<3>>,
+    /// Height of the sensor above what the object stands on. [m]
+    #[arg(long, value_name = "M", requires = "up")]
+    sensor_height: Option<f64>,
+    /// Height above the floor of what the object stands on; above 0 it becomes a table. [m]
+    #[arg(long, value_name = "M", default_value_t = 0.0)]
+    support_height: f64,
+    /// Factor from the file's unit to metres: 0.001 for millimetres.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Keep only this box of the floor frame as the surface to sweep, the rest stays an obstacle:
+    /// xmin,ymin,zmin,xmax,ymax,zmax.
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
+    crop: Option<Numbers<6>>,
+
+    /// The robot's URDF; without it the PR2.
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
+    /// Which arm of the PR2.
+    #[arg(long, value_enum, default_value = "right")]
+    arm: ArmSide,
+    /// Base and tip link of another robot's arm: BASE,TIP.
+    #[arg(long, value_name = "BASE,TIP", requires = "urdf")]
+    chain: Option<String>,
+    /// The tool, a TOML file; without it a sponge of 0.10 × 0.07 m.
+    #[arg(long, value_name = "FILE")]
+    tool: Option<PathBuf>,
+    /// Where the robot stands in the floor frame: x,y,yaw, or `auto`: where it reaches most.
+    #[arg(long, default_value = "auto", allow_hyphen_values = true)]
+    base: Base,
+    /// Height of the PR2's torso joint, with a given base. [m]
+    #[arg(long, value_name = "M")]
+    torso: Option<f64>,
+    /// Position of another held joint: NAME=VALUE.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    held: Vec<HeldArg>,
+    /// Where the arm starts: its joints, comma-separated; without it its home posture.
+    #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true, value_delimiter = ',')]
+    start: Vec<f64>,
+
+    /// Go on from knot K of a plan, for the patches that it has not swept by then.
+    #[arg(long = "continue", value_name = "PLAN@K")]
+    after: Option<KnotOf>,
+    /// With --continue: sweep everything again.
+    #[arg(long, requires = "after")]
+    again: bool,
+
+    /// How the order is found.
+    #[arg(long, value_enum, default_value = "curvature")]
+    method: Method,
+    /// What is minimised.
+    #[arg(long, value_enum, default_value = "time")]
+    cost: CostKind,
+    /// Samples of the inverse kinematics at each tool pose.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    ik_samples: u32,
+    /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
+    #[arg(long)]
+    v_max: Option<f64>,
+    /// Radius of a patch's neighbourhood. [m]
+    #[arg(long, default_value_t = PatchConfig::default().epsilon)]
+    patch_radius: f64,
+    /// Nearest neighbours of each patch that are tried as edges.
+    #[arg(long, default_value_t = GraphConfig::default().neighbours)]
+    neighbours: usize,
+    /// Longest edge. [m]
+    #[arg(long, default_value_t = GraphConfig::default().radius)]
+    radius: f64,
+    /// Weight of turning against distance in the Curvature-GTSP (Eq. 4).
+    #[arg(long, default_value_t = FormulationConfig::default().beta)]
+    beta: f64,
+    /// Trials of the order's search.
+    #[arg(long, default_value_t = FormulationConfig::default().trials)]
+    trials: u64,
+    /// Seed of every random choice: the same seed gives the same plan.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Where the plan is written.
+    #[arg(long, short, value_name = "FILE", default_value = "plan.json")]
+    out: PathBuf,
+    /// Write every figure of the run as JSON to a file, or `-`.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a page with pictures of scan, graph, tool path and joints.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Demo {
+    /// A kitchen chair.
+    Chair,
+    /// The chair's seat alone; the rest of it is an obstacle.
+    ChairSeat,
+    /// A ride-on toy car.
+    BobbyCar,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum ArmSide {
+    Left,
+    Right,
+}
+
+/// N comma-separated finite numbers.
+#[derive(Clone, Copy, Debug)]
+struct Numbers<const N: usize>([f64; N]);
+
+impl<const N: usize> FromStr for Numbers<N> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let values: Vec<f64> = text
+            .split(',')
+            .map(|part| part.trim().parse::<f64>().map_err(|e| format!("`{part}`: {e}")))
+            .collect::<Result<_, _>>()?;
+        let numbers: [f64; N] =
+            values.try_into().map_err(|v: Vec<f64>| format!("{} numbers, not {N}", v.len()))?;
+        if numbers.iter().all(|v| v.is_finite()) {
+            Ok(Self(numbers))
+        } else {
+            Err("the numbers must be finite".into())
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Base {
+    Auto,
+    At([f64; 3]),
+}
+
+impl FromStr for Base {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" { Ok(Self::Auto) } else { Ok(Self::At(Numbers::from_str(text)?.0)) }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct HeldArg(String, f64);
+
+impl FromStr for HeldArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, value) = text.split_once('=').ok_or("NAME=VALUE is wanted")?;
+        Ok(Self(name.into(), value.parse().map_err(|e| format!("`{value}`: {e}"))?))
+    }
+}
+
+#[derive(Clone, Debug)]
+struct KnotOf {
+    plan: PathBuf,
+    knot: usize,
+}
+
+impl FromStr for KnotOf {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (plan, knot) = text.rsplit_once('@').ok_or("PLAN@K is wanted")?;
+        let knot = knot.parse().map_err(|e| format!("`{knot}`: {e}"))?;
+        Ok(Self { plan: plan.into(), knot })
+    }
+}
+
+pub(super) fn run(args: &PlanArgs) -> anyhow::Result<u8> {
+    let bars = Bars::new();
+    let robot = match &args.urdf {
+        Some(path) => Robot::from_urdf_file(path)?,
+        None => Robot::pr2(),
+    };
+    bars.stage("scan", None);
+    let scene = scene(args, &bars)?;
+    let job = job(args, &scene)?;
+    let outcome = pipeline::run(&robot, &scene.surface, &job, &bars);
+    bars.clear();
+    let outcome = outcome?;
+    finish(args, &outcome)
+}
+
+/// Writes what was asked for and prints the table.
+fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
+    let figures = &outcome.figures;
+    if let Some(path) = &args.json {
+        write_json(figures, path)?;
+    }
+    if let Some(path) = &args.report {
+        crate::report::write(path, &outcome.report())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
+    if !to_stdout {
+        println!("{}", table(figures));
+    }
+    let violations = &figures.verification.violations;
+    if violations.is_empty() {
+        outcome.plan.write(&args.out)?;
+        if !to_stdout {
+            println!("plan: {}", args.out.display());
+            if let Some(path) = &args.report {
+                println!("report: {}", path.display());
+            }
+        }
+        return Ok(OK);
+    }
+    for v in violations.iter().take(10) {
+        eprintln!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail);
+    }
+    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
+    Ok(VIOLATIONS)
+}
+
+fn table(f: &Figures) -> Table {
+    let v = &f.verification;
+    let mut table = Table::new();
+    table.load_preset(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+    let mut row = |name: &str, value: String| {
+        table.add_row([name.to_owned(), value]);
+    };
+    row("points", f.points.to_string());
+    row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
+    row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
+    row("base x, y, yaw", format!("{:.3}, {:.3}, {:.3}", f.base[0], f.base[1], f.base[2]));
+    for (name, position) in &f.held {
+        row(name, format!("{position:.3}"));
+    }
+    row("effort", format!("{:.2} rad", f.effort_rad));
+    row("task time", format!("{:.2} s", f.task_time_s));
+    row("distance on the surface", format!("{:.2} m", f.distance_m));
+    row("distance in transfers", format!("{:.2} m", f.transfer_m));
+    row("jumps", f.jumps.to_string());
+    row("dropped patches", f.dropped_patches.to_string());
+    row("knots", f.knots.to_string());
+    row("coverage of reachable points", format!("{:.4}", v.coverage_reachable));
+    row("coverage of all points", format!("{:.4}", v.coverage_all));
+    row("line deviation, max", format!("{:.3} mm", v.line_deviation_max_m * 1e3));
+    let distance = (v.scan_distance_p95_m * 1e3, v.scan_distance_max_m * 1e3);
+    row("distance to the scan, p95, max", format!("{:.2}, {:.2} mm", distance.0, distance.1));
+    row("violations", v.violations.len().to_string());
+    row("calculation", format!("{:.2} s", f.calc_time_total_s));
+    table
+}
+
+/// The scan to sweep, and all else that was seen, in the floor frame.
+struct Scene {
+    surface: Scan,
+    obstacles: Vec<Obstacle>,
+}
+
+fn scene(args: &PlanArgs, bars: &Bars) -> anyhow::Result<Scene> {
+    let (placed, region) = match args.demo {
+        Some(demo) => simulated(demo, args.seed),
+        None => (read_scans(args, bars)?, None),
+    };
+    let region = args.crop.map(|Numbers([a, b, c, d, e, f])| CropBox {
+        min: Point3::new(a, b, c),
+        max: Point3::new(d, e, f),
+    }).or(region);
+    let (whole, _) = scan::clean(&placed, &CleanConfig::default())?;
+    let mut obstacles = vec![Obstacle::floor()];
+    if args.support_height > 0.0 {
+        obstacles.push(table_under(&whole, args.support_height));
+    }
+    let Some(region) = region else { return Ok(Scene { surface: whole, obstacles }) };
+    let surface = whole.cropped(&region);
+    ensure!(
+        !surface.points.is_empty(),
+        "no point of the scan lies in the crop box {:?} … {:?}",
+        region.min,
+        region.max
+    );
+    let rest: Vec<Point3<f64>> =
+        whole.points.iter().filter(|p| !region.contains(p)).copied().collect();
+    obstacles.push(Obstacle::points(rest));
+    Ok(Scene { surface, obstacles })
+}
+
+fn simulated(demo: Demo, seed: u64) -> (PlacedScan, Option<CropBox>) {
+    let (view, region) = match demo {
+        Demo::Chair => (simulate::chair(seed), None),
+        Demo::ChairSeat => (simulate::chair(seed), Some(simulate::chair_seat())),
+        Demo::BobbyCar => (simulate::bobby_car(seed), None),
+    };
+    (scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose)).0, region)
+}
+
+fn read_scans(args: &PlanArgs, bars: &Bars) -> anyhow::Result<PlacedScan> {
+    ensure!(
+        args.sensor_pose.is_empty() || args.sensor_pose.len() == args.scans.len(),
+        "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
+        args.scans.len(),
+        args.sensor_pose.len()
+    );
+    let options = ReadOptions { scale: args.scale, seed: args.seed, ..ReadOptions::default() };
+    let mut joined = PlacedScan::default();
+    let mut first_pose: Option<Isometry3<f64>> = None;
+    for (i, path) in args.scans.iter().enumerate() {
+        let raw = scan::read(path, &options)?;
+        for warning in &raw.warnings {
+            bars.note(&format!("{}: {warning}", path.display()));
+        }
+        let placement = match (args.sensor_pose.get(i), first_pose) {
+            (Some(pose), _) => Placement::SensorPose(isometry(pose)?),
+            // Further scans without a pose of their own share the first one's frame.
+            (None, Some(pose)) => Placement::SensorPose(pose),
+            (None, None) => upright(args)?,
+        };
+        let (placed, pose) = scan::place(&raw, &placement);
+        first_pose = Some(first_pose.unwrap_or(pose));
+        joined.join(placed);
+    }
+    Ok(joined)
+}
+
+fn upright(args: &PlanArgs) -> anyhow::Result<Placement> {
+    let up = match args.up {
+        None => Vector3::z_axis(),
+        Some(Numbers(v)) => UnitVector3::try_new(Vector3::from(v), 1e-6)
+            .context("--up must not be the zero vector")?,
+    };
+    Ok(match args.sensor_height {
+        Some(sensor_height) => {
+            Placement::UpAndHeight { up, sensor_height, support_height: args.support_height }
+        }
+        None => Placement::Up { up, support_height: args.support_height },
+    })
+}
+
+fn isometry(&Numbers([x, y, z, qx, qy, qz, qw]): &Numbers<7>) -> anyhow::Result<Isometry3<f64>> {
+    let rotation = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6)
+        .context("--sensor-pose: the quaternion must not be zero")?;
+    Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+}
+
+/// How far a table top reaches beyond the object. [m]
+const TABLE_RIM: f64 = 0.10;
+/// Thickness of a table top. [m]
+const TABLE_TOP: f64 = 0.03;
+
+/// A table top under the scan.
+fn table_under(scan: &Scan, height: f64) -> Obstacle {
+    let mut low = Point3::new(f64::INFINITY, f64::INFINITY, height - TABLE_TOP);
+    let mut high = Point3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, height);
+    for p in &scan.points {
+        for axis in 0..2 {
+            low[axis] = low[axis].min(p[axis] - TABLE_RIM);
+            high[axis] = high[axis].max(p[axis] + TABLE_RIM);
+        }
+    }
+    Obstacle::cuboid("table", low, high)
+}
+
+fn job(args: &PlanArgs, scene: &Scene) -> anyhow::Result<Job> {
+    let tool = match &args.tool {
+        None => Tool::default(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("cannot read {}", path.display()))?;
+            toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))?
+        }
+    };
+    let after = match &args.after {
+        None => None,
+        Some(KnotOf { plan, knot }) => {
+            Some(After { plan: Plan::read(plan)?, knot: *knot, again: args.again })
+        }
+    };
+    let stance = match (&after, args.base) {
+        (Some(after), _) => StanceChoice::Given(Stance {
+            base: after.plan.base,
+            held: after.plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
+        }),
+        (None, Base::At(base)) => StanceChoice::Given(Stance { base, held: held(args) }),
+        (None, Base::Auto) => {
+            let mut search = StanceSearch { held: held(args), ..StanceSearch::default() };
+            if args.torso.is_some() {
+                search.lift = None;
+            }
+            StanceChoice::Search(search)
+        }
+    };
+    ensure!(args.start.len() <= MAX_DOF, "--start has more than {MAX_DOF} joints");
+    let mut start: JointVector = [0.0; MAX_DOF];
+    start[..args.start.len()].copy_from_slice(&args.start);
+    Ok(Job {
+        arm: spec(args)?,
+        tool,
+        stance,
+        obstacles: scene.obstacles.clone(),
+        start: (!args.start.is_empty()).then_some(start),
+        after,
+        method: args.method,
+        cost: args.cost,
+        ik_samples: args.ik_samples as usize,
+        v_max: args.v_max,
+        patches: PatchConfig { epsilon: args.patch_radius, ..PatchConfig::default() },
+        graph: GraphConfig {
+            neighbours: args.neighbours,
+            radius: args.radius,
+            ..GraphConfig::default()
+        },
+        formulation: FormulationConfig { beta: args.beta, trials: args.trials },
+        collision: crate::collision::Options::default(),
+        seed: args.seed,
+    })
+}
+
+fn held(args: &PlanArgs) -> Vec<(String, f64)> {
+    let torso = args.torso.map(|height| ("torso_lift_joint".to_owned(), height));
+    torso.into_iter().chain(args.held.iter().map(|h| (h.0.clone(), h.1))).collect()
+}
+
+fn spec(args: &PlanArgs) -> anyhow::Result<ArmSpec> {
+    match (&args.chain, &args.urdf) {
+        (Some(chain), _) => {
+            let (base, tip) = chain.split_once(',').context("--chain: BASE,TIP is wanted")?;
+            Ok(ArmSpec { base: base.into(), tip: tip.into() })
+        }
+        (None, Some(_)) if args.arm == ArmSide::Left => Ok(ArmSpec::pr2(Side::Left)),
+        (None, _) => Ok(ArmSpec::pr2(match args.arm {
+            ArmSide::Left => Side::Left,
+            ArmSide::Right => Side::Right,
+        })),
+    }
+}

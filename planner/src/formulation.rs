@@ -1,0 +1,176 @@
+//! The order in which patches are visited, as a (generalised) travelling salesman problem
+//! (paper §III.B and §IV).
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::graph::Graph;
+use crate::gtsp;
+use crate::patches::Patch;
+use crate::reach::{contact_pose, direction};
+use crate::tool::Tool;
+
+/// How the order is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Shortest Euclidean way; the headings follow from it.
+    Tsp,
+    /// A node for each patch and incident edge; distance and turning are weighed (Eq. 4).
+    Curvature,
+}
+
+/// What the formulation needs besides the graph.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FormulationConfig {
+    /// Weight of turning against distance (Eq. 4; paper §V: 0.9).
+    pub beta: f64,
+    /// Trials of the search for each component.
+    pub trials: u64,
+}
+
+impl Default for FormulationConfig {
+    fn default() -> Self {
+        Self { beta: 0.9, trials: 20_000 }
+    }
+}
+
+/// One tool pose of the tour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// The patch.
+    pub patch: usize,
+    /// The pad's heading there. [rad]
+    pub heading: f64,
+}
+
+/// The tour over all components of the graph: an open path that starts near `tool_pose` (the
+/// contact frame in the root frame), one component after the other, always the one nearest to
+/// where the last one ended.
+#[must_use]
+pub fn tour(
+    method: Method,
+    graph: &Graph,
+    patches: &[Patch],
+    tool: &Tool,
+    tool_pose: &Isometry3<f64>,
+    config: &FormulationConfig,
+    seed: u64,
+) -> Vec<Stop> {
+    let mut left: Vec<&Vec<usize>> = graph.components.iter().collect();
+    let mut here = *tool_pose;
+    let mut tour = Vec::new();
+    while !left.is_empty() {
+        let distance = |component: &[usize]| {
+            component
+                .iter()
+                .map(|&p| (patches[p].centre.coords - here.translation.vector).norm())
+                .fold(f64::INFINITY, f64::min)
+        };
+        let nearest = (0..left.len())
+            .min_by(|&a, &b| distance(left[a]).total_cmp(&distance(left[b])).then(a.cmp(&b)))
+            .unwrap_or(0);
+        let component = left.remove(nearest);
+        let problem = Problem { graph, patches, tool, component, start: here, config };
+        let stops = problem.solve(method, seed);
+        if let Some(last) = stops.last() {
+            here = pose(patches, tool, last);
+        }
+        tour.extend(stops);
+    }
+    tour
+}
+
+/// The contact pose of a stop, root frame.
+#[must_use]
+pub fn pose(patches: &[Patch], tool: &Tool, stop: &Stop) -> Isometry3<f64> {
+    let patch = &patches[stop.patch];
+    let travel = direction(&patch.normal, stop.heading);
+    contact_pose(&patch.centre, &patch.normal, &travel, tool.stand_off)
+}
+
+/// The weighed distance of two contact frames (Eq. 4); for a symmetric pad the smaller of the
+/// two turns. [m and rad, weighed]
+#[must_use]
+pub fn curvature(a: &Isometry3<f64>, b: &Isometry3<f64>, beta: f64, symmetric: bool) -> f64 {
+    let between = a.inv_mul(b);
+    let mut angle = between.rotation.angle();
+    if symmetric {
+        let half_turn =
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+        angle = angle.min((between.rotation * half_turn).angle());
+    }
+    (1.0 - beta) * between.translation.vector.norm() + beta * angle
+}
+
+/// One component's problem.
+struct Problem<'a> {
+    graph: &'a Graph,
+    patches: &'a [Patch],
+    tool: &'a Tool,
+    component: &'a [usize],
+    start: Isometry3<f64>,
+    config: &'a FormulationConfig,
+}
+
+impl Problem<'_> {
+    fn solve(&self, method: Method, seed: u64) -> Vec<Stop> {
+        match method {
+            Method::Tsp => {
+                let nodes: Vec<Vec<Stop>> =
+                    self.component.iter().map(|&patch| vec![Stop { patch, heading: 0.0 }]).collect();
+                let order = self.search(&nodes, seed, |a, b| {
+                    (self.patches[a.patch].centre - self.patches[b.patch].centre).norm()
+                });
+                let patches: Vec<usize> = order.iter().map(|s| s.patch).collect();
+                self.headings_along(&patches)
+            }
+            Method::Curvature => {
+                let nodes: Vec<Vec<Stop>> =
+                    self.component.iter().map(|&patch| self.incident_stops(patch)).collect();
+                let poses = |s: &Stop| pose(self.patches, self.tool, s);
+                self.search(&nodes, seed, |a, b| {
+                    curvature(&poses(a), &poses(b), self.config.beta, self.tool.symmetric)
+                })
+            }
+        }
+    }
+
+    /// A stop for each heading in which an edge leaves the patch; one for a lone patch.
+    fn incident_stops(&self, patch: usize) -> Vec<Stop> {
+        let edges = &self.graph.incident[patch];
+        if edges.is_empty() {
+            return vec![Stop { patch, heading: 0.0 }];
+        }
+        edges.iter().map(|&e| Stop { patch, heading: self.graph.edges[e].leaving(patch) }).collect()
+    }
+
+    /// The pad heads where it goes next; at the end, and before a jump, where it came from.
+    fn headings_along(&self, order: &[usize]) -> Vec<Stop> {
+        let edge = |a: usize, b: usize| self.graph.between(a, b).map(|e| &self.graph.edges[e]);
+        (0..order.len())
+            .map(|i| {
+                let patch = order[i];
+                let next = order.get(i + 1).and_then(|&n| edge(patch, n)).map(|e| e.leaving(patch));
+                let before = || {
+                    let previous = *order.get(i.checked_sub(1)?)?;
+                    edge(previous, patch).map(|e| e.leaving(patch) + std::f64::consts::PI)
+                };
+                let any = || self.incident_stops(patch)[0].heading;
+                Stop { patch, heading: next.or_else(before).unwrap_or_else(any) }
+            })
+            .collect()
+    }
+
+    /// Solves the instance whose clusters are `nodes`, with `cost` between nodes of adjacent
+    /// patches, from the start pose on.
+    fn search(
+        &self,
+        nodes: &[Vec<Stop>],
+        seed: u64,
+        cost: impl Fn(&Stop, &Stop) -> f64,
+    ) -> Vec<Stop> {
+        let _ = (nodes, seed, cost, &self.start);
+        unreachable_gtsp()
+    }
+}

@@ -1,0 +1,218 @@
+//! The Euclidean graph over the reachable patches (paper §III.A), with tracked edges.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::patches::Patch;
+use crate::reach::{Sample, Workcell, contact_pose, direction, heading_of, middle_out, redundancies};
+use crate::surface::{Surface, SurfacePoint};
+use crate::track::ToolPath;
+
+/// How the graph is built.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GraphConfig {
+    /// Nearest neighbours of each patch that are tried (paper §V: 8).
+    pub neighbours: usize,
+    /// Longest edge. [m] (paper §V: 10 cm)
+    pub radius: f64,
+    /// Step of the surface line between two patches. [m]
+    pub line_step: f64,
+    /// Redundancy values that are tried before an edge is given up.
+    pub edge_samples: usize,
+}
+
+impl Default for GraphConfig {
+    fn default() -> Self {
+        Self { neighbours: 8, radius: 0.10, line_step: 0.006, edge_samples: 32 }
+    }
+}
+
+/// A way along the surface between two patches that the arm can follow.
+#[derive(Clone, Debug)]
+pub struct Edge {
+    /// The patch where it starts.
+    pub a: usize,
+    /// The patch where it ends.
+    pub b: usize,
+    /// The surface line from `a`'s centre to `b`'s, both included, at least two points.
+    pub line: Vec<SurfacePoint>,
+    /// Heading at `a` of a tool that travels from `a` to `b`. [rad]
+    pub heading_a: f64,
+    /// Heading at `b` of a tool that travels from `a` to `b`. [rad]
+    pub heading_b: f64,
+}
+
+impl Edge {
+    /// Straight distance between the two patches. [m]
+    #[must_use]
+    pub fn chord(&self) -> f64 {
+        (self.line[self.line.len() - 1].point - self.line[0].point).norm()
+    }
+
+    /// The patch at the other end.
+    #[must_use]
+    pub fn other(&self, patch: usize) -> usize {
+        if patch == self.a { self.b } else { self.a }
+    }
+
+    /// The heading at one end of a tool that leaves along the edge. [rad]
+    #[must_use]
+    pub fn leaving(&self, patch: usize) -> f64 {
+        if patch == self.a { self.heading_a } else { self.heading_b + std::f64::consts::PI }
+    }
+}
+
+/// The graph. Nodes are indices into the patches it was built from.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    /// The edges that exist, in a fixed order.
+    pub edges: Vec<Edge>,
+    /// For each patch the indices of its edges; empty for unreachable patches.
+    pub incident: Vec<Vec<usize>>,
+    /// The connected components with at least one patch, largest first, patches ascending.
+    pub components: Vec<Vec<usize>>,
+    /// Pairs of neighbours that were tried.
+    pub candidates: usize,
+}
+
+impl Graph {
+    /// The edge between two patches.
+    #[must_use]
+    pub fn between(&self, a: usize, b: usize) -> Option<usize> {
+        self.incident[a].iter().copied().find(|&e| self.edges[e].other(a) == b)
+    }
+}
+
+/// Builds the graph over the patches that `reached` marks: each patch's nearest neighbours
+/// within the radius, in the union of both directions, joined where a surface line exists and
+/// some branch and redundancy value can be followed along it. `tick` is called once a candidate,
+/// `total` once with their number.
+#[must_use]
+pub fn build(
+    cell: Workcell<'_>,
+    surface: &Surface,
+    patches: &[Patch],
+    reached: &[Option<Sample>],
+    config: &GraphConfig,
+    total: &dyn Fn(usize),
+    tick: &(dyn Fn() + Sync),
+) -> Graph {
+    let pairs = neighbour_pairs(patches, reached, config);
+    total(pairs.len());
+    let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
+    let edges: Vec<Edge> = pairs
+        .par_iter()
+        .map(|&(a, b)| {
+            let edge = edge(surface, patches, a, b, config.line_step)
+                .filter(|edge| can_be_followed(cell, patches, edge, &values));
+            tick();
+            edge
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+        .flatten()
+        .collect();
+
+    let mut incident = vec![Vec::new(); patches.len()];
+    for (i, e) in edges.iter().enumerate() {
+        incident[e.a].push(i);
+        incident[e.b].push(i);
+    }
+    let components = components(&edges, &incident, reached);
+    Graph { edges, incident, components, candidates: pairs.len() }
+}
+
+/// Pairs (a < b) of reachable patches of which one is among the other's nearest.
+fn neighbour_pairs(
+    patches: &[Patch],
+    reached: &[Option<Sample>],
+    config: &GraphConfig,
+) -> Vec<(usize, usize)> {
+    let nodes: Vec<usize> = (0..patches.len()).filter(|&i| reached[i].is_some()).collect();
+    let mut pairs = Vec::new();
+    for &i in &nodes {
+        let mut near: Vec<(f64, usize)> = nodes
+            .iter()
+            .filter(|&&j| j != i)
+            .map(|&j| ((patches[j].centre - patches[i].centre).norm(), j))
+            .filter(|&(d, _)| d <= config.radius && d > 1e-6)
+            .collect();
+        near.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        pairs.extend(near.iter().take(config.neighbours).map(|&(_, j)| (i.min(j), i.max(j))));
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// The surface line between two patches with its headings.
+fn edge(surface: &Surface, patches: &[Patch], a: usize, b: usize, step: f64) -> Option<Edge> {
+    let end = |i: usize| SurfacePoint { point: patches[i].centre, normal: patches[i].normal };
+    let line = surface.line(&end(a), &end(b), step)?;
+    let last = line.len() - 1;
+    Some(Edge {
+        a,
+        b,
+        heading_a: heading_of(&line[0].normal, &(line[1].point - line[0].point)),
+        heading_b: heading_of(&line[last].normal, &(line[last].point - line[last - 1].point)),
+        line,
+    })
+}
+
+/// Whether one branch at one of the redundancy values can be followed along the edge, the pad
+/// heading along it.
+fn can_be_followed(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, values: &[f64]) -> bool {
+    let path = ToolPath::along(edge, false, edge.heading_a, edge.heading_b, cell.tool.stand_off);
+    let pose = |i: usize, heading: f64| {
+        let patch = &patches[i];
+        let travel = direction(&patch.normal, heading);
+        contact_pose(&patch.centre, &patch.normal, &travel, cell.tool.stand_off)
+    };
+    let (start, end) = (pose(edge.a, edge.heading_a), pose(edge.b, edge.heading_b));
+    let (mut from, mut to) = (Vec::new(), Vec::new());
+    values.iter().any(|&value| {
+        from.clear();
+        to.clear();
+        cell.samples(&start, edge.heading_a, &[value], &mut from);
+        if from.is_empty() {
+            return false;
+        }
+        cell.samples(&end, edge.heading_b, &[value], &mut to);
+        from.iter().any(|f| {
+            to.iter().any(|t| t.branch == f.branch && cell.follow(&path, f, t).is_ok())
+        })
+    })
+}
+
+/// Connected components of the reachable patches.
+fn components(
+    edges: &[Edge],
+    incident: &[Vec<usize>],
+    reached: &[Option<Sample>],
+) -> Vec<Vec<usize>> {
+    let mut seen: Vec<bool> = reached.iter().map(Option::is_none).collect();
+    let mut components = Vec::new();
+    for start in 0..reached.len() {
+        if seen[start] {
+            continue;
+        }
+        seen[start] = true;
+        let mut component = vec![start];
+        let mut next = 0;
+        while next < component.len() {
+            let here = component[next];
+            next += 1;
+            for &e in &incident[here] {
+                let other = edges[e].other(here);
+                if !seen[other] {
+                    seen[other] = true;
+                    component.push(other);
+                }
+            }
+        }
+        component.sort_unstable();
+        components.push(component);
+    }
+    components.sort_by_key(|c| (std::cmp::Reverse(c.len()), c[0]));
+    components
+}
