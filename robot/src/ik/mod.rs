@@ -1,0 +1,103 @@
+//! Inverse kinematics behind one trait.
+
+mod numeric;
+mod roll;
+mod shape;
+
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+
+use crate::JointVector;
+use crate::chain::Chain;
+use crate::limits::JointLimits;
+use numeric::Numeric;
+use roll::UpperArmRoll;
+use shape::Pr2Shape;
+
+/// Names one family of solutions that changes continuously with the target.
+///
+/// Following one branch with [`InverseKinematics::solve_on`] never jumps to another posture: the
+/// branch ends (`None`) where it meets another one or leaves the reachable space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Branch(pub u8);
+
+/// Joint positions that put the tip at a target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// Joint positions in chain order.
+    pub q: JointVector,
+    /// The family that the solution belongs to.
+    pub branch: Branch,
+    /// Position of the redundant joint; 0 without redundancy. [rad]
+    pub redundancy: f64,
+}
+
+/// All solutions of one call.
+pub type Solutions = heapless::Vec<Solution, 32>;
+
+/// Finds joint positions for a pose of the tip.
+pub trait InverseKinematics: Send + Sync {
+    /// Range of the redundant joint inside the margined limits [rad]; ±π for a continuous one;
+    /// `None` for an arm without redundancy.
+    fn redundancy_range(&self) -> Option<(f64, f64)>;
+
+    /// Index in the chain of the joint that is the redundancy.
+    fn redundant_joint(&self) -> Option<usize>;
+
+    /// All solutions for a pose of the tip in the root frame at one value of the redundancy.
+    ///
+    /// `out` is cleared first. Joints with limits take the value nearest to the middle of their
+    /// range, continuous joints one in (−π, π]. Not filtered by limits.
+    fn solve(&self, target: &Isometry3<f64>, redundancy: f64, out: &mut Solutions);
+
+    /// The solution on one branch, continuous joints unwrapped nearest to `near`.
+    fn solve_on(
+        &self,
+        branch: Branch,
+        target: &Isometry3<f64>,
+        redundancy: f64,
+        near: &JointVector,
+    ) -> Option<Solution>;
+}
+
+/// Which joint of a PR2-shaped arm is the redundancy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RedundantJoint {
+    /// The third joint, the default: eight solutions at most.
+    UpperArmRoll,
+}
+
+/// The solvers that fit an arm.
+#[derive(Clone)]
+pub(crate) enum Solvers {
+    Pr2 { roll: Arc<UpperArmRoll> },
+    Numeric(Arc<Numeric>),
+}
+
+impl Solvers {
+    pub(crate) fn new(chain: &Chain, limits: &[JointLimits], margined: &[(f64, f64)]) -> Self {
+        match Pr2Shape::recognise(chain, limits) {
+            Some(shape) => Self::Pr2 { roll: Arc::new(UpperArmRoll::new(shape, margined[2])) },
+            None => Self::Numeric(Arc::new(Numeric::new(chain, limits, margined))),
+        }
+    }
+
+    pub(crate) fn default(&self) -> &dyn InverseKinematics {
+        match self {
+            Self::Pr2 { roll } => roll.as_ref(),
+            Self::Numeric(numeric) => numeric.as_ref(),
+        }
+    }
+
+    pub(crate) fn by(&self, joint: RedundantJoint) -> Option<&dyn InverseKinematics> {
+        match (self, joint) {
+            (Self::Pr2 { roll }, RedundantJoint::UpperArmRoll) => Some(roll.as_ref()),
+            (Self::Numeric(_), _) => None,
+        }
+    }
+
+    pub(crate) fn closed_form(&self) -> bool {
+        matches!(self, Self::Pr2 { .. })
+    }
+}

@@ -1,0 +1,103 @@
+//! What `urdf-rs` does not tell: which attributes the text really has.
+//!
+//! `urdf-rs` fills a missing `<limit>` and missing soft limits with zeros, drops words that are
+//! not numbers from vectors, and ignores `acceleration` in files that do not declare URDF 1.2.
+//! A second, shallow reading of the same text restores what matters.
+
+use std::collections::HashMap;
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+/// What the text of one `<joint>` holds.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct JointFacts {
+    /// `<limit>` is there.
+    pub(crate) has_limit: bool,
+    /// `lower` or `upper` of `<limit>` is there (the other one is then 0 by definition).
+    pub(crate) has_range: bool,
+    /// `acceleration` of `<limit>`. [rad/s²] or [m/s²]
+    pub(crate) acceleration: Option<f64>,
+    /// At least one soft limit is there.
+    pub(crate) has_soft_range: bool,
+    /// `k_position` of `<safety_controller>` is there.
+    pub(crate) has_k_position: bool,
+}
+
+/// Reads the facts of every joint by name, and checks that vectors are three numbers.
+pub(crate) fn joint_facts(text: &str) -> Result<HashMap<String, JointFacts>, String> {
+    let mut reader = Reader::from_str(text);
+    let mut facts = HashMap::new();
+    let mut path: Vec<Vec<u8>> = Vec::new();
+    let mut current = String::new();
+    loop {
+        let event = reader
+            .read_event()
+            .map_err(|e| format!("{e} near byte {}", reader.buffer_position()))?;
+        let (element, opens) = match &event {
+            Event::Start(e) => (e, true),
+            Event::Empty(e) => (e, false),
+            Event::End(_) => {
+                path.pop();
+                continue;
+            }
+            Event::Eof => return Ok(facts),
+            _ => continue,
+        };
+        let name = element.name().as_ref().to_vec();
+        let parent = path.last().map(Vec::as_slice);
+        if path.len() == 1 && name == b"joint" {
+            current = attribute(element, "name")?.unwrap_or_default();
+            facts.entry(current.clone()).or_default();
+        } else if path.len() == 2 && parent == Some(b"joint") {
+            read_joint_child(element, &name, facts.entry(current.clone()).or_default())?;
+        }
+        for key in ["xyz", "rpy", "size", "scale"] {
+            if let Some(value) = attribute(element, key)? {
+                let words = value.split_whitespace();
+                if words.clone().count() != 3 || !words.clone().all(|w| w.parse::<f64>().is_ok()) {
+                    let tag = String::from_utf8_lossy(&name).into_owned();
+                    return Err(format!("{key}=\"{value}\" of <{tag}> must be three numbers"));
+                }
+            }
+        }
+        if opens {
+            path.push(name);
+        }
+    }
+}
+
+fn read_joint_child(
+    element: &BytesStart<'_>,
+    name: &[u8],
+    facts: &mut JointFacts,
+) -> Result<(), String> {
+    match name {
+        b"limit" => {
+            facts.has_limit = true;
+            facts.has_range =
+                attribute(element, "lower")?.is_some() || attribute(element, "upper")?.is_some();
+            if let Some(text) = attribute(element, "acceleration")? {
+                let value = text
+                    .trim()
+                    .parse()
+                    .map_err(|_| format!("acceleration=\"{text}\" of <limit> is not a number"))?;
+                facts.acceleration = Some(value);
+            }
+        }
+        b"safety_controller" => {
+            facts.has_soft_range = attribute(element, "soft_lower_limit")?.is_some()
+                || attribute(element, "soft_upper_limit")?.is_some();
+            facts.has_k_position = attribute(element, "k_position")?.is_some();
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+fn attribute(element: &BytesStart<'_>, key: &str) -> Result<Option<String>, String> {
+    let Some(found) = element.try_get_attribute(key).map_err(|e| e.to_string())? else {
+        return Ok(None);
+    };
+    found.unescape_value().map(|v| Some(v.into_owned())).map_err(|e| e.to_string())
+}
