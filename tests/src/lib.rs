@@ -1,1 +1,20 @@
-//! stub
+//! The rehearsal stage of Nullsweep: everything that a plan meets before it meets a robot.
+//!
+//! * [`mock`]: a simulated arm as a process, made of an [`endpoint`] (setpoints and a time in,
+//!   states out), a joint [`servo`], the [`judge`] of every setpoint, and [`fault`]s on request.
+//! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all.
+//! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
+//! * [`witness`]: watches an executor from outside.
+
+pub mod arm_args;
+pub mod endpoint;
+pub mod fault;
+pub mod judge;
+pub mod mock;
+pub mod parts;
+pub mod publisher;
+pub mod record;
+pub mod servo;
+pub mod sketch;
+pub mod stage;
+pub mod witness;

@@ -1,2 +1,9 @@
-//! stub
-fn main() {}
+//! The whole job on one stage: plan a chair's seat, start mock and executor, sweep it, and swap in
+//! a second plan mid-motion.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let args: Vec<_> = std::env::args_os().collect();
+    nullsweep_tests::parts::play(&args).unwrap_or(ExitCode::SUCCESS)
+}

@@ -1,0 +1,361 @@
+//! The mock hardware endpoint without its process: setpoints and a time go in, joint states
+//! come out. No clock and no port, so that a test runs it in virtual time.
+
+use std::time::Duration;
+
+use nullsweep_ipc_types::{JointStates, MAX_HELD_JOINTS, Setpoint, status};
+use nullsweep_robot::{Arm, JointVector};
+use serde::Serialize;
+
+use crate::fault::{FaultAt, FaultKind};
+use crate::judge::{Judge, Rules};
+use crate::servo::Servo;
+
+/// How the endpoint behaves.
+#[derive(Clone, Debug, Default)]
+pub struct Behaviour {
+    /// What the judge allows; its `session_timeout_ns` is also the endpoint's own watchdog.
+    pub rules: Rules,
+    /// Faults to play.
+    pub faults: Vec<FaultAt>,
+}
+
+/// What the endpoint itself did, beside the judge's verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Deeds {
+    /// How often it stopped by itself because setpoints ceased.
+    pub timeouts: u64,
+    /// Setpoints that it did not follow, because after a stop they were too far from the arm.
+    pub refused: u64,
+    /// How often it was asked to disable its motors.
+    pub disabled: u64,
+    /// States sent.
+    pub states: u64,
+}
+
+/// A simulated arm behind the setpoint and state services.
+#[derive(Clone, Debug)]
+pub struct Endpoint {
+    dof: usize,
+    behaviour: Behaviour,
+    started_ns: u64,
+    servo: Servo,
+    judge: Judge,
+    held: Vec<f64>,
+    /// Whether the arm follows setpoints. It begins to with one that is where the arm is.
+    following: bool,
+    timed_out: bool,
+    disabled: bool,
+    last: Option<Received>,
+    frozen: Option<JointVector>,
+    sequence: u64,
+    deeds: Deeds,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Received {
+    sequence: u64,
+    deadline_ns: u64,
+    received_ns: u64,
+}
+
+impl Endpoint {
+    /// An arm at rest at `initial`, with its held joints where `arm` holds them.
+    #[must_use]
+    pub fn new(arm: &Arm, initial: JointVector, behaviour: Behaviour, now_ns: u64) -> Self {
+        Self {
+            dof: arm.dof(),
+            started_ns: now_ns,
+            servo: Servo::new(arm, initial, now_ns),
+            judge: Judge::new(arm, behaviour.rules.clone()),
+            held: arm.held_joints().iter().map(|h| h.position).take(MAX_HELD_JOINTS).collect(),
+            behaviour,
+            following: false,
+            timed_out: false,
+            disabled: false,
+            last: None,
+            frozen: None,
+            sequence: 0,
+            deeds: Deeds::default(),
+        }
+    }
+
+    /// The judge of all setpoints so far.
+    #[must_use]
+    pub fn judge(&self) -> &Judge {
+        &self.judge
+    }
+
+    /// What the endpoint did so far.
+    #[must_use]
+    pub fn deeds(&self) -> Deeds {
+        self.deeds
+    }
+
+    /// Where the arm truly is, whatever a fault makes it report. [rad] or [m]
+    #[must_use]
+    pub fn positions(&self) -> &JointVector {
+        self.servo.positions()
+    }
+
+    /// Whether it stands because setpoints ceased.
+    #[must_use]
+    pub fn is_timed_out(&self) -> bool {
+        self.timed_out
+    }
+
+    /// Judges and follows what one reading pass took out of the buffer, oldest first.
+    pub fn receive(&mut self, pass: &[Setpoint], now_ns: u64) {
+        if !pass.is_empty() {
+            let measured = *self.servo.positions();
+            self.judge.observe(pass, &measured);
+        }
+        for setpoint in pass {
+            // The sender's stamps tell whether setpoints ceased, not when this process woke up.
+            self.watch(setpoint.stamp_ns);
+            self.follow(setpoint, now_ns);
+        }
+        self.watch(now_ns);
+        self.servo.advance(now_ns);
+        if self.is_active(FaultKind::Halt, now_ns) {
+            self.servo.lock();
+            self.following = false;
+        }
+    }
+
+    /// The state to send now; `None` while a fault keeps it back.
+    pub fn measure(&mut self, now_ns: u64) -> Option<JointStates> {
+        self.sequence += 1;
+        let active = |kind| self.is_active(kind, now_ns);
+        if active(FaultKind::Stale) || (active(FaultKind::Drop) && self.sequence.is_multiple_of(2)) {
+            return None;
+        }
+        let mut bits = 0;
+        let mut set = |bit, on| bits |= if on { bit } else { 0 };
+        set(status::CALIBRATED, !active(FaultKind::Uncalibrated));
+        set(status::HALTED, self.disabled || active(FaultKind::Halt));
+        set(status::SETPOINT_TIMEOUT, self.timed_out);
+        set(status::ERROR, active(FaultKind::Error));
+
+        let mut positions = *self.servo.positions();
+        let mut velocities = *self.servo.velocities();
+        if active(FaultKind::Jump) {
+            positions[0] += 0.1;
+        }
+        if active(FaultKind::Nan) {
+            positions[0] = f64::NAN;
+        }
+        let stamp_ns =
+            if active(FaultKind::Delay) { now_ns.saturating_sub(10_000_000) } else { now_ns };
+        let joint_count = self.dof as u32 - u32::from(active(FaultKind::Count));
+        if active(FaultKind::Freeze) {
+            positions = *self.frozen.get_or_insert(positions);
+            velocities = JointVector::default();
+        } else {
+            self.frozen = None;
+        }
+
+        let mut state = <JointStates as bytemuck::Zeroable>::zeroed();
+        state.sequence = self.sequence;
+        state.stamp_ns = stamp_ns;
+        if let Some(last) = self.last {
+            state.setpoint_sequence = last.sequence;
+            state.setpoint_received_ns = last.received_ns;
+        }
+        state.positions[..self.dof].copy_from_slice(&positions[..self.dof]);
+        state.velocities[..self.dof].copy_from_slice(&velocities[..self.dof]);
+        state.held_positions[..self.held.len()].copy_from_slice(&self.held);
+        state.held_count = self.held.len() as u32;
+        state.joint_count = joint_count;
+        state.status = bits;
+        self.deeds.states += 1;
+        Some(state)
+    }
+
+    fn is_active(&self, kind: FaultKind, now_ns: u64) -> bool {
+        let since = Duration::from_nanos(now_ns.saturating_sub(self.started_ns));
+        self.behaviour.faults.iter().any(|f| f.kind == kind && f.is_active(since))
+    }
+
+    /// Stops by itself when the last setpoint's deadline and the grace have passed.
+    fn watch(&mut self, now_ns: u64) {
+        let Some(last) = self.last else { return };
+        let end_ns = last.deadline_ns.saturating_add(self.behaviour.rules.session_timeout_ns);
+        if self.timed_out || now_ns <= end_ns {
+            return;
+        }
+        self.servo.advance(end_ns);
+        self.servo.hold();
+        self.timed_out = true;
+        self.following = false;
+        self.deeds.timeouts += 1;
+    }
+
+    fn follow(&mut self, setpoint: &Setpoint, now_ns: u64) {
+        let sound = setpoint.joint_count as usize == self.dof
+            && setpoint.positions[..self.dof].iter().all(|q| q.is_finite())
+            && setpoint.velocities[..self.dof].iter().all(|v| v.is_finite());
+        if !sound {
+            self.deeds.refused += 1;
+            return;
+        }
+        let (sequence, deadline_ns) = (setpoint.sequence, setpoint.deadline_ns);
+        self.last = Some(Received { sequence, deadline_ns, received_ns: now_ns });
+        self.timed_out = false;
+        if setpoint.disable != 0 && !self.disabled {
+            self.deeds.disabled += 1;
+            self.servo.lock();
+        }
+        self.disabled = setpoint.disable != 0;
+        if self.disabled
+            || self.is_active(FaultKind::Halt, now_ns)
+            || self.is_active(FaultKind::Deaf, now_ns)
+        {
+            self.following = false;
+            return;
+        }
+        if !self.following {
+            let measured = self.servo.positions();
+            let off = |j: usize| (setpoint.positions[j] - measured[j]).abs();
+            let tolerance = self.behaviour.rules.start_tolerance;
+            if (0..self.dof).any(|j| off(j) > tolerance) {
+                self.deeds.refused += 1;
+                return;
+            }
+            self.following = true;
+        }
+        self.servo.follow(setpoint);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nullsweep_ipc_types::Mode;
+    use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    const MS: u64 = 1_000_000;
+
+    /// An endpoint at home and a sender that turns joint 0 by −1 rad/s.
+    struct Rig {
+        endpoint: Endpoint,
+        home: JointVector,
+        sequence: u64,
+        moved: f64,
+    }
+
+    impl Rig {
+        fn new(faults: &[&str]) -> Self {
+            let arm =
+                Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("the PR2 has a right arm");
+            let faults = faults.iter().map(|f| f.parse().expect("a fault")).collect();
+            let behaviour = Behaviour { faults, ..Behaviour::default() };
+            let endpoint = Endpoint::new(&arm, arm.home(), behaviour, 0);
+            Self { endpoint, home: arm.home(), sequence: 0, moved: 0.0 }
+        }
+
+        fn setpoint(&mut self, now_ns: u64) -> Setpoint {
+            let mut s = <Setpoint as bytemuck::Zeroable>::zeroed();
+            self.sequence += 1;
+            self.moved -= 1e-3;
+            (s.sequence, s.stamp_ns, s.deadline_ns) = (self.sequence, now_ns, now_ns + MS);
+            s.joint_count = 7;
+            s.mode = Mode::Executing.wire();
+            s.positions[..7].copy_from_slice(&self.home[..7]);
+            s.positions[0] += self.moved;
+            s.velocities[0] = -1.0;
+            s
+        }
+
+        fn send(&mut self, now_ns: u64) {
+            let setpoint = self.setpoint(now_ns);
+            self.endpoint.receive(&[setpoint], now_ns);
+        }
+    }
+
+    #[test]
+    fn it_stops_by_itself_when_setpoints_cease() {
+        let mut rig = Rig::new(&[]);
+        for k in 0..200 {
+            rig.send(k * MS);
+            assert_eq!(rig.endpoint.measure(k * MS).expect("sent").status, status::CALIBRATED);
+        }
+        // The last deadline is at 200 ms.
+        rig.endpoint.receive(&[], 219 * MS);
+        assert!(!rig.endpoint.is_timed_out());
+        rig.endpoint.receive(&[], 221 * MS);
+        assert!(rig.endpoint.is_timed_out());
+        let state = rig.endpoint.measure(221 * MS).expect("sent");
+        assert_eq!(state.status & status::SETPOINT_TIMEOUT, status::SETPOINT_TIMEOUT);
+        rig.endpoint.receive(&[], 500 * MS);
+        assert!((rig.endpoint.positions()[0] - (rig.home[0] + rig.moved)).abs() < 5e-3);
+        assert_eq!(rig.endpoint.deeds().timeouts, 1);
+
+        // It follows again only what begins where the arm is.
+        rig.moved -= 0.5;
+        rig.send(501 * MS);
+        assert_eq!(rig.endpoint.deeds().refused, 1);
+        rig.moved += 0.5;
+        rig.send(502 * MS);
+        assert_eq!(rig.endpoint.deeds().refused, 1);
+        assert!(!rig.endpoint.is_timed_out());
+    }
+
+    #[test]
+    fn a_reader_that_stalls_does_not_stop_the_arm() {
+        let mut rig = Rig::new(&[]);
+        rig.send(0);
+        let late: Vec<_> = (1..60).map(|k| rig.setpoint(k * MS)).collect();
+        rig.endpoint.receive(&late, 60 * MS);
+        assert_eq!(rig.endpoint.deeds().timeouts, 0);
+        assert!(rig.endpoint.judge().verdict().is_clean());
+    }
+
+    #[test]
+    fn every_fault_shows() {
+        let state_with = |fault: &str| {
+            let mut rig = Rig::new(&[fault]);
+            for k in 0..20 {
+                rig.send(k * MS);
+                rig.endpoint.measure(k * MS);
+            }
+            (rig.endpoint.measure(20 * MS), rig)
+        };
+        let status_of = |fault: &str| state_with(fault).0.expect("sent").status;
+        assert_eq!(status_of("halt@5ms"), status::CALIBRATED | status::HALTED);
+        assert_eq!(status_of("halt@5ms+10ms"), status::CALIBRATED);
+        assert_eq!(status_of("error@5ms"), status::CALIBRATED | status::ERROR);
+        assert_eq!(status_of("uncalibrated@5ms"), 0);
+        assert!(state_with("stale@5ms").0.is_none());
+        assert!(state_with("stale@5ms+5ms").0.is_some());
+        let (state, rig) = state_with("nan@5ms");
+        assert!(state.expect("sent").positions[0].is_nan() && rig.endpoint.positions()[0] < 10.0);
+        let (state, rig) = state_with("jump@5ms");
+        let off = state.expect("sent").positions[0] - rig.endpoint.positions()[0];
+        assert!((off - 0.1).abs() < 1e-12);
+        assert_eq!(state_with("count@5ms").0.expect("sent").joint_count, 6);
+        assert_eq!(state_with("delay@5ms").0.expect("sent").stamp_ns, 10 * MS);
+        let (state, rig) = state_with("freeze@5ms");
+        assert!(state.expect("sent").positions[0] > rig.endpoint.positions()[0] + 5e-3);
+        let (_, rig) = state_with("deaf@5ms");
+        assert!(rig.endpoint.positions()[0] > rig.home[0] - 7e-3);
+        assert_eq!(state_with("drop@0s").1.endpoint.deeds().states, 11);
+    }
+
+    #[test]
+    fn disabled_motors_stand() {
+        let mut rig = Rig::new(&[]);
+        for k in 0..50 {
+            rig.send(k * MS);
+        }
+        let at = rig.endpoint.positions()[0];
+        let mut setpoint = rig.setpoint(50 * MS);
+        setpoint.disable = 1;
+        rig.endpoint.receive(&[setpoint], 50 * MS);
+        rig.endpoint.receive(&[], 65 * MS);
+        assert!((rig.endpoint.positions()[0] - at).abs() < 2e-3);
+        let state = rig.endpoint.measure(65 * MS).expect("sent");
+        assert_eq!(state.status & status::HALTED, status::HALTED);
+        assert_eq!(rig.endpoint.deeds().disabled, 1);
+    }
+}

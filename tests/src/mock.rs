@@ -1,0 +1,234 @@
+//! `mock-hardware`: a simulated arm as a process of its own, and the judge of what it is told.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::Context;
+use clap::Parser;
+use comfy_table::{Table, presets};
+use nullsweep_ipc_types::ports::{Ipc, now_ns};
+use nullsweep_ipc_types::service;
+use rustix::thread::clock_nanosleep_absolute;
+use rustix::time::{ClockId, Timespec};
+use serde::Serialize;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use crate::arm_args::{ArmArgs, initial_posture};
+use crate::endpoint::{Behaviour, Deeds, Endpoint};
+use crate::fault::FaultAt;
+use crate::judge::{Rules, Verdict};
+use crate::record::Recorder;
+
+const PERIOD_NS: u64 = 1_000_000;
+
+/// A simulated arm behind the setpoint and state services, which judges every setpoint.
+///
+/// Ends on SIGTERM, SIGINT or after --seconds, prints its verdict, and exits with 0 only if there
+/// was no violation.
+#[derive(Debug, Parser)]
+#[command(name = "mock-hardware", version)]
+struct Args {
+    #[command(flatten)]
+    arm: ArmArgs,
+    /// Where the joints stand at first, base to tip; without it, the arm's home [rad]
+    #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "Q1,Q2,…")]
+    initial: Vec<f64>,
+    /// End after so many seconds
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    /// A fault to play, as in halt@3s or stale@2s+300ms; may be given several times
+    #[arg(long, value_name = "KIND@START[+LENGTH]")]
+    fault: Vec<FaultAt>,
+    /// Stop by itself so long after the last setpoint's deadline [ms]
+    #[arg(long, default_value_t = 20, value_name = "MS")]
+    timeout: u64,
+    /// Write the measured and commanded joints as CSV
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Time between two recorded measurements [ms]
+    #[arg(long, default_value_t = 5, value_name = "MS")]
+    record_every: u64,
+    /// Write the verdict as JSON, to a file or to standard output with -
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<PathBuf>,
+}
+
+/// What a run of the mock found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// Name of the robot in the services' names.
+    pub robot: String,
+    /// How long it ran. [s]
+    pub seconds: f64,
+    /// Number of violations of all kinds.
+    pub violations: u64,
+    /// The judge's findings.
+    pub verdict: Verdict,
+    /// What the endpoint itself did.
+    pub endpoint: Deeds,
+    /// Cycles of the mock's own loop that began more than one period late.
+    pub own_late_cycles: u64,
+}
+
+/// Runs the mock with the arguments of a command line, program name first.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let args = match Args::try_parse_from(args) {
+        Ok(args) => args,
+        Err(error) => error.exit(),
+    };
+    match run(&args) {
+        Ok(outcome) if outcome.violations == 0 => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("mock-hardware: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let arm = args.arm.load()?;
+    let initial = initial_posture(&arm, &args.initial)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGTERM, SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+
+    let ipc = Ipc::open(&args.arm.robot_name, args.arm.ipc_root.as_deref())?;
+    let setpoints = ipc.setpoint_receiver()?;
+    let states = ipc.state_sender()?;
+    eprintln!(
+        "mock-hardware: arm `{}` with {} joints is ready as robot `{}`",
+        args.arm.arm,
+        arm.dof(),
+        args.arm.robot_name
+    );
+
+    let rules =
+        Rules { session_timeout_ns: args.timeout.saturating_mul(1_000_000), ..Rules::default() };
+    let behaviour = Behaviour { rules, faults: args.fault.clone() };
+    let start_ns = now_ns();
+    let mut endpoint = Endpoint::new(&arm, initial, behaviour, start_ns);
+    let mut recorder = Recorder::new(args.record_every.max(1) * 1_000_000);
+    let end_ns = args.seconds.map(|s| start_ns + Duration::from_secs_f64(s).as_nanos() as u64);
+
+    let mut pass = Vec::with_capacity(2 * service::SETPOINT.buffer);
+    let mut newest = None;
+    let mut due_ns = start_ns;
+    let mut own_late_cycles = 0;
+    let mut now = start_ns;
+    while !stop.load(Ordering::Relaxed) && end_ns.is_none_or(|end| now < end) {
+        due_ns += PERIOD_NS;
+        sleep_until(due_ns);
+        now = now_ns();
+        if now > due_ns + PERIOD_NS {
+            own_late_cycles += 1;
+            due_ns += (now - due_ns) / PERIOD_NS * PERIOD_NS;
+        }
+        pass.clear();
+        // At most one buffer and what comes meanwhile: a fast sender cannot hold the loop.
+        while pass.len() < pass.capacity()
+            && let Some(setpoint) = setpoints.receive()?
+        {
+            pass.push(setpoint);
+        }
+        endpoint.receive(&pass, now);
+        newest = pass.last().copied().or(newest);
+        if let Some(state) = endpoint.measure(now) {
+            states.send(&state)?;
+        }
+        recorder.offer(now, endpoint.positions(), newest.as_ref());
+    }
+
+    let outcome = Outcome {
+        robot: args.arm.robot_name.clone(),
+        seconds: (now - start_ns) as f64 * 1e-9,
+        violations: endpoint.judge().verdict().total(),
+        verdict: endpoint.judge().verdict().clone(),
+        endpoint: endpoint.deeds(),
+        own_late_cycles,
+    };
+    if let Some(path) = &args.record {
+        let file = File::create(path)
+            .with_context(|| format!("cannot write the record to {}", path.display()))?;
+        let mut out = BufWriter::new(file);
+        recorder.write_csv(arm.joint_names(), &mut out)?;
+        out.flush()?;
+    }
+    report(args, &outcome)?;
+    Ok(outcome)
+}
+
+fn sleep_until(due_ns: u64) {
+    let due = Timespec {
+        tv_sec: (due_ns / 1_000_000_000) as i64,
+        tv_nsec: (due_ns % 1_000_000_000) as i64,
+    };
+    // A signal that interrupts the sleep only makes one cycle early.
+    let _ = clock_nanosleep_absolute(ClockId::Monotonic, &due);
+}
+
+fn report(args: &Args, outcome: &Outcome) -> anyhow::Result<()> {
+    match &args.json {
+        Some(path) if path.as_os_str() == "-" => {
+            serde_json::to_writer_pretty(io::stdout().lock(), outcome)?;
+            println!();
+        }
+        Some(path) => {
+            let file = File::create(path)
+                .with_context(|| format!("cannot write the verdict to {}", path.display()))?;
+            serde_json::to_writer_pretty(file, outcome)?;
+            println!("{}", table(outcome));
+        }
+        None => println!("{}", table(outcome)),
+    }
+    Ok(())
+}
+
+fn table(outcome: &Outcome) -> String {
+    let verdict = &outcome.verdict;
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY);
+    table.set_header(["mock hardware", outcome.robot.as_str()]);
+    let mut row = |what: &str, value: String| {
+        table.add_row([what.to_owned(), value]);
+    };
+    row("time", format!("{:.1} s", outcome.seconds));
+    row("setpoints", format!("{} in {} sessions", verdict.setpoints, verdict.sessions));
+    row("violations", outcome.violations.to_string());
+    for (kind, count) in verdict.violations.iter().filter(|(_, count)| **count > 0) {
+        row(&format!("  {kind}"), count.to_string());
+    }
+    row("largest step", format!("{:.1} % of v·T", 100.0 * verdict.largest_step_ratio));
+    if verdict.least_margin.is_finite() {
+        row("least margin to a limit", format!("{:.4}", verdict.least_margin));
+    }
+    row("lost by this reader", verdict.lost_by_reader.to_string());
+    row(
+        "made late by the sender",
+        format!("{}, at most {:.1} ms", verdict.late, verdict.worst_lateness_ns as f64 * 1e-6),
+    );
+    row("stopped by itself", format!("{} times", outcome.endpoint.timeouts));
+    row("refused setpoints", outcome.endpoint.refused.to_string());
+    for run in verdict.plans.iter().filter(|run| run.plan != "0/0") {
+        row(
+            &format!("plan {}", run.plan),
+            format!("setpoints {} … {}", run.first_sequence, run.last_sequence),
+        );
+    }
+    let mut text = table.to_string();
+    for violation in &verdict.first {
+        text.push_str("\n  ");
+        text.push_str(&violation.to_string());
+    }
+    if verdict.setpoints == 0 {
+        text.push_str("\nno setpoint came: is an executor running for this robot?");
+    }
+    text
+}
