@@ -21,7 +21,7 @@ pub struct ArmArgs {
     /// The arm: right, left, or BASE_LINK:TIP_LINK
     #[arg(long, default_value = "right", value_name = "ARM")]
     pub arm: String,
-    /// Height of the PR2's torso, short for --held torso_lift_joint=H [m]
+    /// Height of the PR2's torso, short for --held torso_lift_joint=H, in m
     #[arg(long, value_name = "H")]
     pub torso: Option<f64>,
     /// Where a joint outside the arm stands; may be given several times

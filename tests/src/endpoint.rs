@@ -34,7 +34,7 @@ pub struct Deeds {
 }
 
 /// A simulated arm behind the setpoint and state services.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Endpoint {
     dof: usize,
     behaviour: Behaviour,
@@ -92,7 +92,7 @@ impl Endpoint {
         self.deeds
     }
 
-    /// Where the arm truly is, whatever a fault makes it report. [rad] or [m]
+    /// Where the arm truly is, whatever a fault makes it report. \[rad\] or \[m\]
     #[must_use]
     pub fn positions(&self) -> &JointVector {
         self.servo.positions()
@@ -127,7 +127,8 @@ impl Endpoint {
     pub fn measure(&mut self, now_ns: u64) -> Option<JointStates> {
         self.sequence += 1;
         let active = |kind| self.is_active(kind, now_ns);
-        if active(FaultKind::Stale) || (active(FaultKind::Drop) && self.sequence.is_multiple_of(2)) {
+        if active(FaultKind::Stale) || (active(FaultKind::Drop) && self.sequence.is_multiple_of(2))
+        {
             return None;
         }
         let mut bits = 0;

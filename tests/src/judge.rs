@@ -14,15 +14,16 @@ use serde::Serialize;
 /// What the judge allows.
 #[derive(Clone, Debug)]
 pub struct Rules {
-    /// Period that one sequence number stands for. [ns]
+    /// Period that one sequence number stands for. \[ns\]
     pub period_ns: u64,
-    /// How far the first setpoint of a session may be from the measured position. [rad] or [m]
+    /// How far the first setpoint of a session may be from the measured position. \[rad\] or \[m\]
     pub start_tolerance: f64,
-    /// Silence after a deadline that ends a session. [ns]
+    /// Silence after a deadline that ends a session. \[ns\]
     pub session_timeout_ns: u64,
     /// Samples that the reader's buffer holds: a pass that takes out this many may have lost some.
     pub buffer: usize,
-    /// Share by which a step may exceed v·T for rounding alone.
+    /// What times in whole nanoseconds may cost: the share by which a speed may exceed its limit,
+    /// and how far a position may be outside. \[rad\] or \[m\]
     pub rounding: f64,
     /// How many violations are kept in full; the others are only counted.
     pub kept: usize,
@@ -35,7 +36,7 @@ impl Default for Rules {
             start_tolerance: 0.02,
             session_timeout_ns: 20_000_000,
             buffer: service::SETPOINT.buffer,
-            rounding: 1e-9,
+            rounding: 1e-6,
             kept: 10,
         }
     }
@@ -140,7 +141,7 @@ pub struct PlanRun {
     /// Sequence number of its last setpoint.
     pub last_sequence: u64,
     /// Largest change of a joint's velocity from the setpoint before the first one to it.
-    /// [rad/s] or [m/s]
+    /// \[rad/s\] or \[m/s\]
     pub join_velocity_step: f64,
     /// Largest step of a joint from the setpoint before the first one, as a share of v·T.
     pub join_step_ratio: f64,
@@ -161,12 +162,12 @@ pub struct Verdict {
     pub lost_by_reader: u64,
     /// Setpoints that were made more than one period after they were due.
     pub late: u64,
-    /// The largest such lateness. [ns]
+    /// The largest such lateness. \[ns\]
     pub worst_lateness_ns: u64,
     /// The largest step of any joint, as a share of v·T·Δsequence.
     pub largest_step_ratio: f64,
     /// The least distance of any setpoint from a soft limit moved in by its braking way; negative
-    /// outside, infinite where no joint has limits. [rad] or [m]
+    /// outside, infinite where no joint has limits. \[rad\] or \[m\]
     pub least_margin: f64,
     /// The plans in the order in which they were executed.
     pub plans: Vec<PlanRun>,
@@ -187,7 +188,7 @@ impl Verdict {
 }
 
 /// The judge: fed with what each reading pass took out of the buffer.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Judge {
     arm: Arm,
     rules: Rules,

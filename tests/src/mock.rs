@@ -36,7 +36,7 @@ const PERIOD_NS: u64 = 1_000_000;
 struct Args {
     #[command(flatten)]
     arm: ArmArgs,
-    /// Where the joints stand at first, base to tip; without it, the arm's home [rad]
+    /// Where the joints stand at first, base to tip; without it, the arm's home, in rad
     #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "Q1,Q2,…")]
     initial: Vec<f64>,
     /// End after so many seconds
@@ -45,13 +45,13 @@ struct Args {
     /// A fault to play, as in halt@3s or stale@2s+300ms; may be given several times
     #[arg(long, value_name = "KIND@START[+LENGTH]")]
     fault: Vec<FaultAt>,
-    /// Stop by itself so long after the last setpoint's deadline [ms]
+    /// Stop by itself so long after the last setpoint's deadline, in ms
     #[arg(long, default_value_t = 20, value_name = "MS")]
     timeout: u64,
     /// Write the measured and commanded joints as CSV
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Time between two recorded measurements [ms]
+    /// Time between two recorded measurements, in ms
     #[arg(long, default_value_t = 5, value_name = "MS")]
     record_every: u64,
     /// Write the verdict as JSON, to a file or to standard output with -
@@ -64,7 +64,7 @@ struct Args {
 pub struct Outcome {
     /// Name of the robot in the services' names.
     pub robot: String,
-    /// How long it ran. [s]
+    /// How long it ran. \[s\]
     pub seconds: f64,
     /// Number of violations of all kinds.
     pub violations: u64,

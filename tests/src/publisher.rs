@@ -22,7 +22,7 @@ struct Args {
     /// How often to swing out and back
     #[arg(long, default_value_t = 1)]
     swings: usize,
-    /// How far each joint swings [rad]
+    /// How far each joint swings, in rad
     #[arg(long, default_value_t = 0.2)]
     angle: f64,
     /// Share of the velocity limits

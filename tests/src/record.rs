@@ -14,9 +14,9 @@ pub struct Sample {
     pub plan: PlanId,
     /// The knot whose segment was executed.
     pub knot: u32,
-    /// Measured positions. [rad] or [m]
+    /// Measured positions. \[rad\] or \[m\]
     pub positions: JointVector,
-    /// Commanded positions. [rad] or [m]
+    /// Commanded positions. \[rad\] or \[m\]
     pub commanded: JointVector,
 }
 
@@ -63,7 +63,7 @@ impl Recorder {
         &self.samples
     }
 
-    /// Writes time since the first measurement [s], plan, knot, measured and commanded joints.
+    /// Writes time since the first measurement \[s\], plan, knot, measured and commanded joints.
     pub fn write_csv(&self, joints: &[String], out: &mut impl Write) -> io::Result<()> {
         write!(out, "time_s,plan,knot")?;
         for name in joints {

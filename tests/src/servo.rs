@@ -8,7 +8,7 @@ use nullsweep_robot::{Arm, JointVector};
 /// arm did meanwhile, not a jump.
 #[derive(Clone, Debug)]
 pub struct Servo {
-    /// Natural frequency of the loop. [rad/s]
+    /// Natural frequency of the loop. \[rad/s\]
     omega: f64,
     speed_limits: JointVector,
     dof: usize,
@@ -28,7 +28,7 @@ struct Target {
 
 impl Servo {
     /// Bandwidth of the position loop: the error after a corner of 1 rad/s stays below
-    /// 1/(e·ω) = 3 mrad. [rad/s]
+    /// 1/(e·ω) = 3 mrad. \[rad/s\]
     pub const OMEGA: f64 = 125.0;
     /// How much faster than the velocity limit the servo may catch up.
     const CATCH_UP: f64 = 1.05;
@@ -48,13 +48,13 @@ impl Servo {
         Self { omega: Self::OMEGA, speed_limits, dof, now_ns, positions, velocities, target }
     }
 
-    /// Joint positions at the time of the last call. [rad] or [m]
+    /// Joint positions at the time of the last call. \[rad\] or \[m\]
     #[must_use]
     pub fn positions(&self) -> &JointVector {
         &self.positions
     }
 
-    /// Joint velocities at the time of the last call. [rad/s] or [m/s]
+    /// Joint velocities at the time of the last call. \[rad/s\] or \[m/s\]
     #[must_use]
     pub fn velocities(&self) -> &JointVector {
         &self.velocities

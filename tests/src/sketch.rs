@@ -17,10 +17,10 @@ pub struct Sketch {
 }
 
 impl Sketch {
-    /// Longest time between two knots. [s]
+    /// Longest time between two knots. \[s\]
     const KNOT_DISTANCE: f64 = 0.05;
 
-    /// Straight lines through `postures` at `speed`, a share (0…1] of the joints' velocity
+    /// Straight lines through `postures` at `speed`, a share (0…1\] of the joints' velocity
     /// limits; the slowest joint of each line sets its time.
     ///
     /// # Panics
@@ -89,7 +89,7 @@ impl Sketch {
         self
     }
 
-    /// How long the plan takes. [s]
+    /// How long the plan takes. \[s\]
     #[must_use]
     pub fn seconds(&self) -> f64 {
         self.knots.last().map_or(0.0, |k| k.time_from_start_ns as f64 * 1e-9)
@@ -104,7 +104,7 @@ impl Sketch {
     }
 }
 
-/// Every joint turned by `angle` away from its nearer limit. [rad]
+/// Every joint turned by `angle` away from its nearer limit. \[rad\]
 #[must_use]
 pub fn swung(arm: &Arm, from: &JointVector, angle: f64) -> JointVector {
     let mut q = *from;

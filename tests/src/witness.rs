@@ -38,7 +38,7 @@ pub enum WitnessError {
     Missed {
         /// What was waited for.
         what: String,
-        /// For how long. [s]
+        /// For how long. \[s\]
         seconds: u64,
         /// What was seen instead.
         state: String,

@@ -1,8 +1,5 @@
 //! Mock, executor and publisher as processes that really talk, each test under a root path of
 //! its own. Nothing here asserts how fast anything is: these run on loaded machines too.
 
-mod kill;
+mod common;
 mod mock;
-mod reject;
-mod rig;
-mod run;

@@ -10,7 +10,7 @@ use nullsweep_tests::stage::{Part, Process, Stage};
 use nullsweep_tests::witness::PATIENCE;
 use serde_json::Value;
 
-use crate::rig::{right_arm, stage, verdict};
+use crate::common::{right_arm, stage, verdict};
 
 /// A hand-made executor.
 struct Hand {
