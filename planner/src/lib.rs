@@ -10,4 +10,8 @@ pub mod patches;
 pub mod report;
 pub mod scan;
 pub mod simulate;
+pub mod surface;
 pub mod tool;
+
+mod fit;
+mod grid;

@@ -1,0 +1,162 @@
+//! What can be wrong with a scan, and what is merely worth saying.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a scan was refused.
+#[derive(Debug, Error)]
+pub enum ScanError {
+    /// The file could not be opened or read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The file's name and its first bytes match no supported format.
+    #[error("{}: neither PCD, PLY, STL, OBJ, XYZ nor CSV by its extension or first bytes", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file breaks its own format.
+    #[error("{}: {place}: {cause}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file.
+        place: Place,
+        /// What is wrong there.
+        cause: String,
+    },
+    /// The file is sound but holds fewer finite points than a surface needs.
+    #[error(
+        "{}: {found} usable points (and {dropped} not finite); a surface needs at least {needed}",
+        path.display()
+    )]
+    TooFew {
+        /// The file.
+        path: PathBuf,
+        /// Finite points found.
+        found: usize,
+        /// Points dropped as not finite.
+        dropped: usize,
+        /// Least number accepted.
+        needed: usize,
+    },
+    /// All points of the file are one and the same.
+    #[error("{}: all {count} points lie at one place; is the sensor's lens covered?", path.display())]
+    OnePlace {
+        /// The file.
+        path: PathBuf,
+        /// How many points.
+        count: usize,
+    },
+    /// Nothing is left after the crop.
+    #[error(
+        "the crop box keeps none of {points} points, which span {min:.3?} to {max:.3?} m in the \
+         floor frame; widen the box or check the placement"
+    )]
+    EmptyCrop {
+        /// Points before the crop.
+        points: usize,
+        /// Least corner of the placed scan. \[m\]
+        min: [f64; 3],
+        /// Greatest corner of the placed scan. \[m\]
+        max: [f64; 3],
+    },
+    /// Cleaning left too little to plan on.
+    #[error(
+        "{left} of {points} points are left after cleaning, {needed} are needed: the points form \
+         no surface at the scale of {radius:.3} m (too sparse, one line, or a wrong unit; see \
+         the scale option)"
+    )]
+    NoSurface {
+        /// Points before cleaning.
+        points: usize,
+        /// Points after cleaning.
+        left: usize,
+        /// Least number accepted.
+        needed: usize,
+        /// The neighbourhood in which a surface was sought. \[m\]
+        radius: f64,
+    },
+}
+
+/// Where in a file something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line, counted from 1.
+    Line(usize),
+    /// A byte, counted from 0.
+    Byte(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// Something about a scan that its user should know, though it was accepted.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ScanWarning {
+    /// The extent suggests that the file is not in metres.
+    LooksLikeMillimetres {
+        /// Longest side of the bounding box, in the file's unit.
+        extent: f64,
+    },
+    /// Points were dropped as NaN or infinite; depth cameras mark missing pixels so.
+    NonFinite {
+        /// How many.
+        dropped: usize,
+    },
+    /// The file goes on after the points that its header announces.
+    TrailingData {
+        /// Where the surplus begins.
+        place: Place,
+    },
+    /// A mesh needed a wider sampling than asked for to stay within the point limit.
+    SpacingWidened {
+        /// The spacing used. \[m\]
+        spacing: f64,
+    },
+}
+
+impl fmt::Display for ScanWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LooksLikeMillimetres { extent } => write!(
+                f,
+                "the points span {extent:.0} units, which looks like millimetres: use a scale of 0.001"
+            ),
+            Self::NonFinite { dropped } => {
+                write!(f, "{dropped} points dropped as not finite (pixels without depth)")
+            }
+            Self::TrailingData { place } => {
+                write!(f, "data from {place} on ignored: the header announces fewer points")
+            }
+            Self::SpacingWidened { spacing } => {
+                write!(f, "the mesh is large: sampled every {:.1} mm", spacing * 1e3)
+            }
+        }
+    }
+}
+
+/// A format error before it is tied to a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Malformed {
+    pub(super) place: Place,
+    pub(super) cause: String,
+}
+
+/// Shorthand for the parsers.
+pub(super) fn malformed<T>(place: Place, cause: impl Into<String>) -> Result<T, Malformed> {
+    Err(Malformed { place, cause: cause.into() })
+}

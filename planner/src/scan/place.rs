@@ -1,0 +1,246 @@
+//! Moving scans from a sensor's frame into the floor frame.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+
+use super::error::ScanError;
+use super::read::RawScan;
+
+/// What is known about where a scan was taken.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Placement {
+    /// The sensor's pose in the floor frame: takes the file's coordinates to the floor frame.
+    SensorPose(Isometry3<f64>),
+    /// The direction against gravity in the file's frame, the sensor's height above the plane
+    /// that the object stands on, and that plane's height above the floor (a table). The sensor
+    /// is the origin of the file's frame; the points' mean comes to stand over the origin.
+    UpAndHeight {
+        /// Against gravity, in the file's frame.
+        up: UnitVector3<f64>,
+        /// Of the sensor above the support. \[m\]
+        sensor_height: f64,
+        /// Of the support above the floor. \[m\]
+        support_height: f64,
+    },
+    /// Only the direction against gravity is known: the lowest point rests on the support, the
+    /// points' mean comes to stand over the origin, and no sensor orients the normals.
+    Up {
+        /// Against gravity, in the file's frame.
+        up: UnitVector3<f64>,
+        /// Of the support above the floor. \[m\]
+        support_height: f64,
+    },
+    /// The file's own VIEWPOINT is the sensor's pose in the floor frame and the points are in the
+    /// sensor's frame. Without one in the file, the identity.
+    Viewpoint,
+}
+
+/// One view in the floor frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Points in the floor frame. \[m\]
+    pub points: Vec<Point3<f64>>,
+    /// Normals that the file gave, parallel to `points`.
+    pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// Where the sensor stood; `None`: unknown. \[m\]
+    pub sensor: Option<Point3<f64>>,
+}
+
+/// Views in the floor frame: z up, the floor at z = 0.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlacedScan {
+    /// The views, in the order of the files.
+    pub views: Vec<View>,
+}
+
+/// Moves a scan into the floor frame. Returns it with the pose that takes the file's coordinates
+/// there, so that a second view of the same frame can be placed with
+/// [`Placement::SensorPose`].
+#[must_use]
+pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64>) {
+    let pose = match placement {
+        Placement::SensorPose(pose) => *pose,
+        Placement::Viewpoint => raw.viewpoint.unwrap_or_default(),
+        Placement::UpAndHeight { up, sensor_height, support_height } => {
+            let upright = upright(up);
+            let mean = mean(&raw.points, &upright);
+            let height = sensor_height + support_height;
+            Isometry3::from_parts(Translation3::new(-mean.x, -mean.y, height), upright)
+        }
+        Placement::Up { up, support_height } => {
+            let upright = upright(up);
+            let mean = mean(&raw.points, &upright);
+            let lowest = raw.points.iter().map(|p| (upright * p).z).fold(f64::INFINITY, f64::min);
+            let shift = Translation3::new(-mean.x, -mean.y, support_height - lowest);
+            Isometry3::from_parts(shift, upright)
+        }
+    };
+    let sensor = match placement {
+        Placement::Up { .. } => None,
+        _ => Some(Point3::from(pose.translation.vector)),
+    };
+    let view = View {
+        points: raw.points.iter().map(|p| pose * p).collect(),
+        normals: raw
+            .normals
+            .as_ref()
+            .map(|normals| normals.iter().map(|n| pose.rotation * n).collect()),
+        sensor,
+    };
+    (PlacedScan { views: vec![view] }, pose)
+}
+
+impl PlacedScan {
+    /// Adds the views of another scan in the same frame.
+    pub fn join(&mut self, other: Self) {
+        self.views.extend(other.views);
+    }
+
+    /// Number of points in all views.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.views.iter().map(|view| view.points.len()).sum()
+    }
+
+    /// Whether no view has a point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The points inside a box of the floor frame.
+    ///
+    /// # Errors
+    /// [`ScanError::EmptyCrop`] if there is none, with the extent of what was there.
+    pub fn crop(&self, region: &CropBox) -> Result<Self, ScanError> {
+        let views: Vec<View> = self.views.iter().map(|view| crop(view, region)).collect();
+        let cropped = Self { views };
+        if !cropped.is_empty() {
+            return Ok(cropped);
+        }
+        let mut min = Vector3::repeat(f64::INFINITY);
+        let mut max = -min;
+        for point in self.views.iter().flat_map(|view| &view.points) {
+            (min, max) = (min.inf(&point.coords), max.sup(&point.coords));
+        }
+        Err(ScanError::EmptyCrop { points: self.len(), min: min.into(), max: max.into() })
+    }
+}
+
+/// An axis-aligned box, bounds included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CropBox {
+    /// Least corner. \[m\]
+    pub min: Point3<f64>,
+    /// Greatest corner. \[m\]
+    pub max: Point3<f64>,
+}
+
+impl CropBox {
+    /// Whether the box holds a point.
+    #[must_use]
+    pub fn contains(&self, point: &Point3<f64>) -> bool {
+        (0..3).all(|axis| self.min[axis] <= point[axis] && point[axis] <= self.max[axis])
+    }
+}
+
+impl std::str::FromStr for CropBox {
+    type Err = String;
+
+    /// Parses `xmin,ymin,zmin,xmax,ymax,zmax`.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let values: Vec<f64> = text
+            .split(',')
+            .map(|v| v.trim().parse().map_err(|_| format!("{v:?} is not a number")))
+            .collect::<Result<_, _>>()?;
+        let [a, b, c, d, e, f] = values[..] else {
+            return Err(format!(
+                "{} numbers where xmin,ymin,zmin,xmax,ymax,zmax is needed",
+                values.len()
+            ));
+        };
+        let region = Self { min: Point3::new(a, b, c), max: Point3::new(d, e, f) };
+        if (0..3).all(|axis| region.min[axis] < region.max[axis]) {
+            Ok(region)
+        } else {
+            Err("each minimum must lie below its maximum".into())
+        }
+    }
+}
+
+fn crop(view: &View, region: &CropBox) -> View {
+    let kept: Vec<usize> =
+        (0..view.points.len()).filter(|&i| region.contains(&view.points[i])).collect();
+    View {
+        points: kept.iter().map(|&i| view.points[i]).collect(),
+        normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
+        sensor: view.sensor,
+    }
+}
+
+/// The rotation that takes `up` to z and, so that what the camera looks at lies ahead, its
+/// forward axis (z of an optical frame) to x as far as it is level. A frame that already stands
+/// upright is left as it is.
+fn upright(up: &UnitVector3<f64>) -> UnitQuaternion<f64> {
+    if up.z > 0.999_9 {
+        return UnitQuaternion::rotation_between(up, &Vector3::z()).unwrap_or_default();
+    }
+    let forward = Vector3::z();
+    let mut x = forward - up.scale(forward.dot(up));
+    if x.norm() < 0.1 {
+        x = Vector3::x() - up.scale(up.x);
+    }
+    let x = x.normalize();
+    let y = up.cross(&x);
+    let rows = nalgebra::Matrix3::from_rows(&[x.transpose(), y.transpose(), up.transpose()]);
+    UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(rows))
+}
+
+/// The mean of the rotated points.
+fn mean(points: &[Point3<f64>], rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
+    let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
+    rotation * (sum / points.len().max(1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn raw(points: Vec<Point3<f64>>) -> RawScan {
+        RawScan { points, normals: None, viewpoint: None, dropped: 0, warnings: Vec::new() }
+    }
+
+    #[test]
+    fn an_optical_frame_is_set_upright_with_its_floor_at_zero() {
+        // A level camera 1.2 m up: y points down, so the floor lies at y = 1.2.
+        let scan = raw(vec![Point3::new(0.1, 1.2, 2.0), Point3::new(-0.1, 0.2, 2.0)]);
+        let placement = Placement::UpAndHeight {
+            up: UnitVector3::new_normalize(Vector3::new(0.0, -1.0, 0.0)),
+            sensor_height: 1.2,
+            support_height: 0.0,
+        };
+        let (placed, pose) = place(&scan, &placement);
+        let view = &placed.views[0];
+        assert!((view.points[0] - Point3::new(0.0, -0.1, 0.0)).norm() < 1e-12);
+        assert!((view.points[1] - Point3::new(0.0, 0.1, 1.0)).norm() < 1e-12);
+        assert!((view.sensor.unwrap() - Point3::new(-2.0, 0.0, 1.2)).norm() < 1e-12);
+        assert!((pose * Point3::new(0.1, 1.2, 2.0) - view.points[0]).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_mesh_rests_on_its_table() {
+        let scan = raw(vec![Point3::new(1.0, 2.0, -0.3), Point3::new(3.0, 4.0, 0.2)]);
+        let placement = Placement::Up { up: Vector3::z_axis(), support_height: 0.72 };
+        let (placed, _) = place(&scan, &placement);
+        assert!((placed.views[0].points[0] - Point3::new(-1.0, -1.0, 0.72)).norm() < 1e-12);
+        assert_eq!(placed.views[0].sensor, None);
+    }
+
+    #[test]
+    fn a_crop_box_reads_and_refuses() {
+        let region: CropBox = "-1,-1,0.3,1,1,0.6".parse().unwrap();
+        assert!(region.contains(&Point3::new(0.0, 0.0, 0.3)));
+        assert!(!region.contains(&Point3::new(0.0, 0.0, 0.61)));
+        assert!("0,0,0,1,1".parse::<CropBox>().is_err());
+        assert!("0,0,0,1,1,0".parse::<CropBox>().is_err());
+    }
+}
