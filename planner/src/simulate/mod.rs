@@ -1,0 +1,48 @@
+//! Simulated scans: the paper's two objects (§V) as a Kinect would have seen them.
+//!
+//! The authors' recordings are not published. These stand-ins have the size, the sensor and the
+//! point of view that their patch counts and tour lengths imply: a chair of about 0.5 m² and a
+//! toy car of about 0.3 m², seen once from 1.35 m height.
+
+mod camera;
+mod shape;
+
+use nalgebra::{Isometry3, Point3};
+
+pub use camera::Kinect;
+
+use crate::scan::{CropBox, RawScan};
+use shape::Shape;
+
+/// One view of a simulated object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedView {
+    /// The points in the optical frame (x right, y down, z forward), without the floor.
+    pub scan: RawScan,
+    /// The optical frame in the floor frame: z up, the object standing at the origin, its front
+    /// towards −x, where the sensor stands.
+    pub sensor_pose: Isometry3<f64>,
+}
+
+/// Height of the sensor above the floor. \[m\]
+const SENSOR_HEIGHT: f64 = 1.35;
+
+/// A kitchen chair, its seat 0.44 m high and its backrest away from the sensor.
+#[must_use]
+pub fn chair(seed: u64) -> SimulatedView {
+    let eye = Point3::new(-0.72, -0.22, SENSOR_HEIGHT);
+    Kinect::default().view(&shape::chair(), eye, Point3::new(0.03, 0.0, 0.45), seed)
+}
+
+/// A ride-on toy car of 0.62 m length, its side towards the sensor.
+#[must_use]
+pub fn bobby_car(seed: u64) -> SimulatedView {
+    let eye = Point3::new(-0.68, 0.18, SENSOR_HEIGHT);
+    Kinect::default().view(&shape::bobby_car(), eye, Point3::new(0.0, 0.0, 0.16), seed)
+}
+
+/// The seat of [`chair`] without backrest and legs, in the floor frame.
+#[must_use]
+pub fn chair_seat() -> CropBox {
+    CropBox { min: Point3::new(-0.30, -0.30, 0.40), max: Point3::new(0.185, 0.30, 0.50) }
+}
