@@ -16,13 +16,13 @@ pub(super) enum Shape {
     /// Between two points: radius. \[m\]
     Capsule(Point3<f64>, Point3<f64>, f64),
     /// Bent about z-parallel axes: the content is displaced along x by y² / (2 radius). \[m\]
-    Bent(Box<Shape>, f64),
+    Bent(Box<Self>, f64),
     /// Placed in the parent's frame.
-    At(Isometry3<f64>, Box<Shape>),
+    At(Isometry3<f64>, Box<Self>),
     /// Larger by a factor.
-    Scaled(f64, Box<Shape>),
+    Scaled(f64, Box<Self>),
     /// Joined with fillets of about this radius. \[m\]
-    Union(Vec<Shape>, f64),
+    Union(Vec<Self>, f64),
 }
 
 impl Shape {
