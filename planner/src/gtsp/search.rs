@@ -1,0 +1,165 @@
+//! Construction and localised iterated local search.
+
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+
+use super::local::{LocalSearch, Order};
+use super::table::Table;
+
+/// Longest of the two stretches that a kick exchanges.
+const KICK: usize = 30;
+
+/// A randomised nearest-neighbour tour, nodes chosen as it goes.
+pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> Order {
+    let m = table.m;
+    let mut chosen = vec![0; m];
+    let mut visited = vec![false; m];
+    let mut order = Vec::with_capacity(m);
+    let mut here = table.root as u32;
+    chosen[here as usize] = rng.random_range(0..table.sizes[here as usize]);
+    loop {
+        order.push(here);
+        visited[here as usize] = true;
+        if order.len() == m {
+            return Order::new(table, order, chosen);
+        }
+        let mut best = (i32::MAX, here, 0);
+        let consider = |b: u32, best: &mut (i32, u32, u32), skip: bool| {
+            if visited[b as usize] || skip {
+                return;
+            }
+            let (add, row) = table.row(here, chosen[here as usize], b);
+            for (j, d) in row.iter().enumerate() {
+                if d + add < best.0 {
+                    *best = (d + add, b, j as u32);
+                }
+            }
+        };
+        for (b, _) in table.near_out(here) {
+            let skip = rng.random_range(0..8) == 0;
+            consider(b, &mut best, skip);
+        }
+        if best.1 == here {
+            for b in 0..m as u32 {
+                consider(b, &mut best, false);
+            }
+        }
+        chosen[best.1 as usize] = best.2;
+        here = best.1;
+    }
+}
+
+/// Brings a fresh tour to a local optimum.
+pub(super) fn settle(table: &Table, local: &mut LocalSearch, tour: &mut Order) {
+    for &c in &tour.order {
+        local.push(c);
+    }
+    local.run(table, tour);
+    local.layers.whole(table, tour);
+}
+
+/// The optimum of a tour of so few clusters that the local search has no room: every order, each
+/// with its best nodes.
+pub(super) fn enumerate(table: &Table, local: &mut LocalSearch, tour: &mut Order) {
+    let m = table.m;
+    let mut best = tour.clone();
+    let mut counters = vec![0; m];
+    let mut k = 1;
+    // Heap's algorithm on the positions behind the root.
+    while k < m {
+        if counters[k] + 1 < k {
+            let (x, y) = if k % 2 == 1 { (1, k) } else { (1 + counters[k], k) };
+            tour.order.swap(x, y);
+            *tour = Order::new(table, tour.order.clone(), tour.chosen.clone());
+            local.layers.whole(table, tour);
+            if tour.cost < best.cost {
+                best.copy_from(tour);
+            }
+            counters[k] += 1;
+            k = 1;
+        } else {
+            counters[k] = 0;
+            k += 1;
+        }
+    }
+    tour.copy_from(&best);
+}
+
+/// How one run of the iterated local search cools down.
+#[derive(Clone, Copy)]
+pub(super) struct Cooling {
+    /// Trials of the run.
+    pub(super) trials: u64,
+    /// First and last temperature in units of the typical arc.
+    pub(super) from: f64,
+    /// See `from`.
+    pub(super) to: f64,
+}
+
+/// Kicks, repairs and accepts by the temperature; returns the best tour met and the trials made.
+/// `stop` is asked every 64 trials.
+pub(super) fn iterate(
+    table: &Table,
+    local: &mut LocalSearch,
+    tour: &mut Order,
+    cooling: Cooling,
+    rng: &mut ChaCha8Rng,
+    stop: &dyn Fn() -> bool,
+) -> u64 {
+    let m = table.m;
+    if m < 8 {
+        enumerate(table, local, tour);
+        return 0;
+    }
+    let mut best = tour.clone();
+    let mut kept = tour.clone();
+    let ratio = cooling.to / cooling.from;
+    let mut temperature = cooling.from * table.typical;
+    let mut made = 0;
+    while made < cooling.trials {
+        if made % 64 == 0 {
+            if stop() {
+                break;
+            }
+            temperature =
+                cooling.from * table.typical * ratio.powf(made as f64 / cooling.trials as f64);
+        }
+        made += 1;
+        kick(table, local, tour, rng);
+        local.run(table, tour);
+        let u: f64 = rng.random_range(f64::MIN_POSITIVE..1.0);
+        let allowed = kept.cost + (-u.ln() * temperature) as i64;
+        if tour.cost <= allowed {
+            kept.copy_from(tour);
+            if tour.cost < best.cost {
+                best.copy_from(tour);
+            }
+        } else {
+            tour.copy_from(&kept);
+        }
+    }
+    local.layers.whole(table, &mut best);
+    tour.copy_from(&best);
+    made
+}
+
+/// Exchanges two neighbouring stretches at a random place.
+fn kick(table: &Table, local: &mut LocalSearch, tour: &mut Order, rng: &mut ChaCha8Rng) {
+    let m = tour.order.len();
+    let longest = KICK.min((m - 2) / 2).max(1);
+    let one = rng.random_range(1..=longest);
+    let two = rng.random_range(1..=longest.min(m - 1 - one));
+    let first = rng.random_range(1..=m - one - two);
+    let (middle, last) = (first + one, first + one + two - 1);
+    let joints = [(first - 1, first), (middle - 1, middle), (last, last + 1)];
+    let before: i64 = joints.iter().map(|&(p, q)| tour.stretch_cost(table, p, q)).sum();
+    tour.exchange(first, middle, last);
+    let middle = first + two;
+    let joints = [(first - 1, first), (middle - 1, middle), (last, last + 1)];
+    let after: i64 = joints.iter().map(|&(p, q)| tour.stretch_cost(table, p, q)).sum();
+    tour.cost += after - before;
+    for (p, q) in joints {
+        local.push(tour.at(p).0);
+        local.push(tour.at(q).0);
+    }
+}

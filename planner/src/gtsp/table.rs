@@ -1,0 +1,359 @@
+//! The search's own copy of the costs: integers in blocks of cluster pairs, and candidate lists.
+//!
+//! Costs become i32 (exactly so where they are small integers), so that sums are exact and every
+//! machine takes the same decisions. Jumps get a search price that is high against every arc but
+//! no higher, so that a huge h neither overflows nor freezes the search; what a tour really costs
+//! is always taken from the instance.
+
+use super::instance::{Ends, Instance, Jump};
+use super::tour::Tour;
+
+/// Jump price in the search, in units of the largest arc worth having.
+const JUMP_FACTOR: f64 = 4.0;
+/// An entry that is the largest of all and at least this common is "no arc" in disguise.
+const DISGUISED_JUMPS: f64 = 0.3;
+/// Length of a candidate list.
+pub(super) const NEAR: usize = 10;
+
+/// Costs for the search over `m` clusters, one of which, the root, always stands at position 0.
+pub(super) struct Table {
+    pub(super) m: usize,
+    pub(super) root: usize,
+    pub(super) sizes: Vec<u32>,
+    /// Reversing a stretch without the root leaves the costs inside it as they are.
+    pub(super) reversible: bool,
+    /// Mean over the clusters of the cheapest arc out of them: the scale of the temperature.
+    pub(super) typical: f64,
+    pairs: Vec<Pair>,
+    transposed: Vec<u32>,
+    data: Vec<i32>,
+    near_out: Vec<u32>,
+    near_in: Vec<u32>,
+    near_cost: Vec<i32>,
+    near_in_cost: Vec<i32>,
+    near_start: Vec<(u32, u32)>,
+    /// The root is the fixed start outside the clusters.
+    outer_root: bool,
+}
+
+/// Where a block lies; absent blocks share one of zeros and add their price.
+#[derive(Clone, Copy)]
+struct Pair {
+    at: u32,
+    add: i32,
+}
+
+struct Raw<'a> {
+    instance: &'a Instance,
+    m: usize,
+    root: usize,
+    disguised: Option<f64>,
+}
+
+impl Raw<'_> {
+    fn size(&self, a: usize) -> usize {
+        self.instance.sizes().get(a).copied().unwrap_or(1)
+    }
+
+    fn maybe_adjacent(&self, a: usize, b: usize) -> bool {
+        a >= self.instance.clusters()
+            || b >= self.instance.clusters()
+            || self.instance.adjacent(a, b)
+            || self.into_root(b)
+    }
+
+    fn into_root(&self, b: usize) -> bool {
+        b == self.root && *self.instance.ends() != Ends::Closed
+    }
+
+    fn arc(&self, a: usize, i: usize, b: usize, j: usize) -> Option<f64> {
+        if self.into_root(b) {
+            return Some(0.0); // the closing arc of an open path
+        }
+        let arc = match self.instance.ends() {
+            Ends::OpenFromCosts(start) if a == self.root => {
+                Some(start[self.instance.node_index(b, j)]).filter(|c| c.is_finite())
+            }
+            _ => self.instance.arc(a, i, b, j),
+        };
+        arc.filter(|c| Some(*c) != self.disguised)
+    }
+
+    fn price(&self, a: usize, b: usize) -> f64 {
+        if let Some(price) = self.disguised {
+            return price;
+        }
+        if self.into_root(b) {
+            0.0 // never asked for: that arc always exists
+        } else if a >= self.instance.clusters() {
+            self.instance.start_jump_price()
+        } else {
+            self.instance.jump_price(a, b)
+        }
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        (0..self.m).flat_map(move |a| (0..self.m).map(move |b| (a, b))).filter(|(a, b)| a != b)
+    }
+
+    fn entries(&self, a: usize, b: usize) -> impl Iterator<Item = Option<f64>> + '_ {
+        let adjacent = self.maybe_adjacent(a, b);
+        (0..self.size(a))
+            .flat_map(move |i| (0..self.size(b)).map(move |j| (i, j)))
+            .map(move |(i, j)| if adjacent { self.arc(a, i, b, j) } else { None })
+    }
+}
+
+struct Statistics {
+    largest: f64,
+    integers: bool,
+    disguised: Option<f64>,
+}
+
+impl Table {
+    pub(super) fn new(instance: &Instance) -> Self {
+        let clusters = instance.clusters();
+        let (root, m) = match *instance.ends() {
+            Ends::OpenFromCosts(_) => (clusters, clusters + 1),
+            Ends::OpenFromCluster(start) => (start, clusters),
+            Ends::Closed => {
+                ((0..clusters).min_by_key(|&c| instance.sizes()[c]).unwrap_or(0), clusters)
+            }
+        };
+        let mut raw = Raw { instance, m, root, disguised: None };
+        let statistics = statistics(&raw);
+        raw.disguised = statistics.disguised;
+
+        let cap = statistics.largest.max(f64::MIN_POSITIVE);
+        let ceiling = JUMP_FACTOR * cap;
+        let room = f64::from(1 << 30) / (m + 2) as f64;
+        let whole_prices = match (statistics.disguised, instance.jump()) {
+            (Some(_), _) | (None, Jump::Forbidden) => true,
+            (None, Jump::Uniform(h)) => h.fract() == 0.0,
+            (None, Jump::Table(table)) => table.iter().all(|h| h.fract() == 0.0),
+        };
+        let scale = if statistics.integers && whole_prices && ceiling <= room {
+            1.0
+        } else {
+            room / ceiling
+        };
+        let quantise = |c: f64| (c.clamp(-ceiling, ceiling) * scale).round() as i32;
+
+        let sizes: Vec<u32> = (0..m).map(|a| raw.size(a) as u32).collect();
+        let widest = sizes.iter().copied().max().unwrap_or(1) as usize;
+        let mut data = vec![0; widest * widest];
+        let mut pairs = vec![Pair { at: 0, add: 0 }; m * m];
+        let mut lowest = vec![i32::MAX; m * m];
+        let mut row = Vec::new();
+        for (a, b) in raw.pairs() {
+            let price = raw.price(a, b);
+            let search_price = quantise(price);
+            row.clear();
+            let mut present = false;
+            if raw.maybe_adjacent(a, b) {
+                for entry in raw.entries(a, b) {
+                    present |= entry.is_some();
+                    row.push(entry.map_or(search_price, quantise));
+                }
+            }
+            if present {
+                pairs[a * m + b] = Pair { at: data.len() as u32, add: 0 };
+                lowest[a * m + b] = row.iter().copied().min().unwrap_or(i32::MAX);
+                data.extend_from_slice(&row);
+            } else {
+                pairs[a * m + b] = Pair { at: 0, add: search_price };
+            }
+        }
+        let reversible = raw.pairs().all(|(a, b)| {
+            a < b || a == root || b == root || {
+                let (p, q) = (pairs[a * m + b], pairs[b * m + a]);
+                let (x, y) = (sizes[a] as usize, sizes[b] as usize);
+                p.add == q.add
+                    && (0..x).all(|i| {
+                        (0..y).all(|j| {
+                            data[p.at as usize + i * y + j] == data[q.at as usize + j * x + i]
+                        })
+                    })
+            }
+        });
+        let mut transposed = vec![0; m * m];
+        for (a, b) in raw.pairs() {
+            let p = pairs[a * m + b];
+            if p.at == 0 {
+                continue;
+            }
+            let back = pairs[b * m + a];
+            transposed[a * m + b] = if reversible && a != root && b != root {
+                back.at
+            } else {
+                let (x, y) = (sizes[a] as usize, sizes[b] as usize);
+                let start = data.len();
+                for j in 0..y {
+                    for i in 0..x {
+                        let value = data[p.at as usize + i * y + j];
+                        data.push(value);
+                    }
+                }
+                start as u32
+            };
+        }
+        let mut table = Self {
+            m,
+            root,
+            sizes,
+            reversible,
+            typical: 1.0,
+            pairs,
+            transposed,
+            data,
+            near_out: Vec::new(),
+            near_in: Vec::new(),
+            near_cost: Vec::new(),
+            near_in_cost: Vec::new(),
+            near_start: Vec::new(),
+            outer_root: root >= clusters,
+        };
+        table.find_candidates(&lowest, *instance.ends() != Ends::Closed);
+        table
+    }
+
+    fn find_candidates(&mut self, lowest: &[i32], open: bool) {
+        let m = self.m;
+        let mut typical = 0.0;
+        let mut counted = 0;
+        for a in 0..m {
+            let list = |cost: &dyn Fn(usize) -> i32, skip_root: bool| {
+                let mut list: Vec<(i32, usize)> = (0..m)
+                    .filter(|&b| b != a && !(skip_root && b == self.root))
+                    .map(|b| (cost(b), b))
+                    .filter(|(c, _)| *c != i32::MAX)
+                    .collect();
+                list.sort_unstable();
+                list.truncate(NEAR);
+                list
+            };
+            let out = list(&|b| lowest[a * m + b], open);
+            let into = list(&|b| lowest[b * m + a], false);
+            if let Some(&(c, _)) = out.first() {
+                typical += f64::from(c);
+                counted += 1;
+            }
+            self.near_start.push((self.near_out.len() as u32, self.near_in.len() as u32));
+            for (c, b) in out {
+                self.near_out.push(b as u32);
+                self.near_cost.push(c);
+            }
+            for (c, b) in into {
+                self.near_in.push(b as u32);
+                self.near_in_cost.push(c);
+            }
+        }
+        self.near_start.push((self.near_out.len() as u32, self.near_in.len() as u32));
+        self.typical = (typical / f64::from(counted.max(1))).max(1.0);
+    }
+
+    /// Cost from node `i` of `a` to node `j` of `b`.
+    #[inline]
+    pub(super) fn d(&self, a: u32, i: u32, b: u32, j: u32) -> i32 {
+        let pair = self.pairs[a as usize * self.m + b as usize];
+        pair.add + self.data[(pair.at + i * self.sizes[b as usize] + j) as usize]
+    }
+
+    /// Costs from node `i` of `a` to every node of `b`: what to add, and the row.
+    #[inline]
+    pub(super) fn row(&self, a: u32, i: u32, b: u32) -> (i32, &[i32]) {
+        let pair = self.pairs[a as usize * self.m + b as usize];
+        let width = self.sizes[b as usize];
+        let at = (pair.at + i * width) as usize;
+        (pair.add, &self.data[at..at + width as usize])
+    }
+
+    /// Costs from every node of `a` to node `j` of `b`.
+    #[inline]
+    pub(super) fn column(&self, a: u32, b: u32, j: u32) -> (i32, &[i32]) {
+        let k = a as usize * self.m + b as usize;
+        let height = self.sizes[a as usize];
+        let at = (self.transposed[k] + j * height) as usize;
+        (self.pairs[k].add, &self.data[at..at + height as usize])
+    }
+
+    /// The block from `a` to `b`, row-major.
+    #[inline]
+    pub(super) fn block(&self, a: u32, b: u32) -> (i32, &[i32]) {
+        let pair = self.pairs[a as usize * self.m + b as usize];
+        let count = (self.sizes[a as usize] * self.sizes[b as usize]) as usize;
+        (pair.add, &self.data[pair.at as usize..pair.at as usize + count])
+    }
+
+    /// Clusters that are cheap to reach from `a`, nearest first, with the cheapest arc.
+    #[inline]
+    pub(super) fn near_out(&self, a: u32) -> impl Iterator<Item = (u32, i32)> + '_ {
+        let range =
+            self.near_start[a as usize].0 as usize..self.near_start[a as usize + 1].0 as usize;
+        self.near_out[range.clone()].iter().copied().zip(self.near_cost[range].iter().copied())
+    }
+
+    /// Clusters from which `a` is cheap to reach, nearest first, with the cheapest arc.
+    #[inline]
+    pub(super) fn near_in(&self, a: u32) -> impl Iterator<Item = (u32, i32)> + '_ {
+        let range =
+            self.near_start[a as usize].1 as usize..self.near_start[a as usize + 1].1 as usize;
+        self.near_in[range.clone()].iter().copied().zip(self.near_in_cost[range].iter().copied())
+    }
+
+    /// The public form of an order of clusters with the root first.
+    pub(super) fn tour(&self, order: &[u32], chosen: &[u32]) -> Tour {
+        let order = &order[usize::from(self.outer_root)..];
+        Tour {
+            clusters: order.iter().map(|&c| c as usize).collect(),
+            nodes: order.iter().map(|&c| chosen[c as usize] as usize).collect(),
+        }
+    }
+}
+
+fn statistics(raw: &Raw<'_>) -> Statistics {
+    let mut largest = f64::NEG_INFINITY;
+    let mut magnitude: f64 = 0.0;
+    let mut integers = true;
+    let (mut entries, mut at_largest) = (0_u64, 0_u64);
+    for (a, b) in raw.pairs() {
+        if !raw.maybe_adjacent(a, b) || raw.into_root(b) {
+            continue;
+        }
+        for cost in raw.entries(a, b) {
+            entries += 1;
+            let Some(cost) = cost else { continue };
+            integers &= cost.fract() == 0.0;
+            magnitude = magnitude.max(cost.abs());
+            if cost > largest {
+                (largest, at_largest) = (cost, 0);
+            }
+            at_largest += u64::from(cost == largest);
+        }
+    }
+    let complete = !matches!(raw.instance.jump(), Jump::Table(_));
+    let common = at_largest as f64 >= DISGUISED_JUMPS * entries as f64;
+    if complete && common && largest > 0.0 {
+        // The largest of the rest is the scale of the arcs; without a rest all costs are equal.
+        let rest =
+            raw.pairs().filter(|&(_, b)| !raw.into_root(b)).flat_map(|(a, b)| raw.entries(a, b));
+        let below = rest
+            .flatten()
+            .filter(|&c| c < largest)
+            .fold(None, |m: Option<f64>, c| Some(m.map_or(c, |m| m.max(c))));
+        let same_price = match raw.instance.jump() {
+            Jump::Uniform(h) => *h == largest || entries_are_finite(raw),
+            _ => entries_are_finite(raw),
+        };
+        if let (Some(below), true) = (below, same_price) {
+            if below > 0.0 {
+                return Statistics { largest: below, integers, disguised: Some(largest) };
+            }
+        }
+    }
+    Statistics { largest: magnitude, integers, disguised: None }
+}
+
+fn entries_are_finite(raw: &Raw<'_>) -> bool {
+    raw.pairs().all(|(a, b)| raw.maybe_adjacent(a, b) && raw.entries(a, b).all(|e| e.is_some()))
+}
