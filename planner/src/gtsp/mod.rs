@@ -36,5 +36,5 @@ mod tour;
 
 pub use exact::solve as solve_exact;
 pub use instance::{Block, CostFn, Costs, Ends, Instance, InstanceError, Jump, OnDemand, Weight};
-pub use solve::{Budget, Control, Progress, Solution, SolveError, solve, solve_with};
+pub use solve::{Budget, Control, Observer, Progress, Solution, SolveError, solve, solve_with};
 pub use tour::{Tour, TourCost, TourError};

@@ -59,15 +59,15 @@ impl Raw<'_> {
         a >= self.instance.clusters()
             || b >= self.instance.clusters()
             || self.instance.adjacent(a, b)
-            || self.into_root(b)
+            || self.enters_root(b)
     }
 
-    fn into_root(&self, b: usize) -> bool {
+    fn enters_root(&self, b: usize) -> bool {
         b == self.root && *self.instance.ends() != Ends::Closed
     }
 
     fn arc(&self, a: usize, i: usize, b: usize, j: usize) -> Option<f64> {
-        if self.into_root(b) {
+        if self.enters_root(b) {
             return Some(0.0); // the closing arc of an open path
         }
         let arc = match self.instance.ends() {
@@ -83,7 +83,7 @@ impl Raw<'_> {
         if let Some(price) = self.disguised {
             return price;
         }
-        if self.into_root(b) {
+        if self.enters_root(b) {
             0.0 // never asked for: that arc always exists
         } else if a >= self.instance.clusters() {
             self.instance.start_jump_price()
@@ -317,7 +317,7 @@ fn statistics(raw: &Raw<'_>) -> Statistics {
     let mut integers = true;
     let (mut entries, mut at_largest) = (0_u64, 0_u64);
     for (a, b) in raw.pairs() {
-        if !raw.maybe_adjacent(a, b) || raw.into_root(b) {
+        if !raw.maybe_adjacent(a, b) || raw.enters_root(b) {
             continue;
         }
         for cost in raw.entries(a, b) {
@@ -336,7 +336,7 @@ fn statistics(raw: &Raw<'_>) -> Statistics {
     if complete && common && largest > 0.0 {
         // The largest of the rest is the scale of the arcs; without a rest all costs are equal.
         let rest =
-            raw.pairs().filter(|&(_, b)| !raw.into_root(b)).flat_map(|(a, b)| raw.entries(a, b));
+            raw.pairs().filter(|&(_, b)| !raw.enters_root(b)).flat_map(|(a, b)| raw.entries(a, b));
         let below = rest
             .flatten()
             .filter(|&c| c < largest)
@@ -345,10 +345,8 @@ fn statistics(raw: &Raw<'_>) -> Statistics {
             Jump::Uniform(h) => *h == largest || entries_are_finite(raw),
             _ => entries_are_finite(raw),
         };
-        if let (Some(below), true) = (below, same_price) {
-            if below > 0.0 {
-                return Statistics { largest: below, integers, disguised: Some(largest) };
-            }
+        if let Some(below) = below.filter(|&below| below > 0.0 && same_price) {
+            return Statistics { largest: below, integers, disguised: Some(largest) };
         }
     }
     Statistics { largest: magnitude, integers, disguised: None }
