@@ -1,11 +1,13 @@
 //! The order in which patches are visited, as a (generalised) travelling salesman problem
 //! (paper §III.B and §IV).
 
+use std::collections::HashMap;
+
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::graph::Graph;
-use crate::gtsp;
+use crate::gtsp::{self, Block, Budget, Costs, Ends, Instance, InstanceError, Jump, SolveError};
 use crate::patches::Patch;
 use crate::reach::{contact_pose, direction};
 use crate::tool::Tool;
@@ -25,13 +27,13 @@ pub enum Method {
 pub struct FormulationConfig {
     /// Weight of turning against distance (Eq. 4; paper §V: 0.9).
     pub beta: f64,
-    /// Trials of the search for each component.
-    pub trials: u64,
+    /// Trials of the search for each patch.
+    pub trials_per_cluster: u64,
 }
 
 impl Default for FormulationConfig {
     fn default() -> Self {
-        Self { beta: 0.9, trials: 20_000 }
+        Self { beta: 0.9, trials_per_cluster: 100 }
     }
 }
 
@@ -44,10 +46,27 @@ pub struct Stop {
     pub heading: f64,
 }
 
+/// Why there is no order.
+#[derive(Debug, thiserror::Error)]
+pub enum FormulationError {
+    /// The instance is not one.
+    #[error("the order's instance: {0}")]
+    Instance(#[from] InstanceError),
+    /// The solver cannot solve it.
+    #[error("the order's search: {0}")]
+    Solve(#[from] SolveError),
+}
+
+/// Price of going between patches that no edge joins (Eq. 3's h): dearer than any whole tour. [m]
+/// or weighed [m and rad]
+const JUMP: f64 = 1e4;
+
 /// The tour over all components of the graph: an open path that starts near `tool_pose` (the
 /// contact frame in the root frame), one component after the other, always the one nearest to
 /// where the last one ended.
-#[must_use]
+///
+/// # Errors
+/// A cost that is not a number; it does not occur for finite patches.
 pub fn tour(
     method: Method,
     graph: &Graph,
@@ -56,7 +75,7 @@ pub fn tour(
     tool_pose: &Isometry3<f64>,
     config: &FormulationConfig,
     seed: u64,
-) -> Vec<Stop> {
+) -> Result<Vec<Stop>, FormulationError> {
     let mut left: Vec<&Vec<usize>> = graph.components.iter().collect();
     let mut here = *tool_pose;
     let mut tour = Vec::new();
@@ -72,13 +91,13 @@ pub fn tour(
             .unwrap_or(0);
         let component = left.remove(nearest);
         let problem = Problem { graph, patches, tool, component, start: here, config };
-        let stops = problem.solve(method, seed);
+        let stops = problem.solve(method, seed)?;
         if let Some(last) = stops.last() {
             here = pose(patches, tool, last);
         }
         tour.extend(stops);
     }
-    tour
+    Ok(tour)
 }
 
 /// The contact pose of a stop, root frame.
@@ -114,23 +133,22 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    fn solve(&self, method: Method, seed: u64) -> Vec<Stop> {
+    fn solve(&self, method: Method, seed: u64) -> Result<Vec<Stop>, FormulationError> {
         match method {
             Method::Tsp => {
                 let nodes: Vec<Vec<Stop>> =
                     self.component.iter().map(|&patch| vec![Stop { patch, heading: 0.0 }]).collect();
                 let order = self.search(&nodes, seed, |a, b| {
-                    (self.patches[a.patch].centre - self.patches[b.patch].centre).norm()
-                });
+                    (a.translation.vector - b.translation.vector).norm()
+                })?;
                 let patches: Vec<usize> = order.iter().map(|s| s.patch).collect();
-                self.headings_along(&patches)
+                Ok(self.headings_along(&patches))
             }
             Method::Curvature => {
                 let nodes: Vec<Vec<Stop>> =
                     self.component.iter().map(|&patch| self.incident_stops(patch)).collect();
-                let poses = |s: &Stop| pose(self.patches, self.tool, s);
                 self.search(&nodes, seed, |a, b| {
-                    curvature(&poses(a), &poses(b), self.config.beta, self.tool.symmetric)
+                    curvature(a, b, self.config.beta, self.tool.symmetric)
                 })
             }
         }
@@ -162,15 +180,44 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// Solves the instance whose clusters are `nodes`, with `cost` between nodes of adjacent
-    /// patches, from the start pose on.
+    /// Solves the instance whose clusters are `nodes`, with `cost` between contact poses of
+    /// adjacent patches, from the start pose on: an open path.
     fn search(
         &self,
         nodes: &[Vec<Stop>],
         seed: u64,
-        cost: impl Fn(&Stop, &Stop) -> f64,
-    ) -> Vec<Stop> {
-        let _ = (nodes, seed, cost, &self.start);
-        unreachable_gtsp()
+        cost: impl Fn(&Isometry3<f64>, &Isometry3<f64>) -> f64,
+    ) -> Result<Vec<Stop>, FormulationError> {
+        let poses: Vec<Vec<Isometry3<f64>>> = nodes
+            .iter()
+            .map(|stops| stops.iter().map(|s| pose(self.patches, self.tool, s)).collect())
+            .collect();
+        let cluster: HashMap<usize, usize> =
+            self.component.iter().enumerate().map(|(c, &patch)| (patch, c)).collect();
+        let mut blocks = Vec::new();
+        for (a, &patch) in self.component.iter().enumerate() {
+            for &edge in &self.graph.incident[patch] {
+                let b = cluster[&self.graph.edges[edge].other(patch)];
+                if a < b {
+                    let costs = poses[a]
+                        .iter()
+                        .flat_map(|from| poses[b].iter().map(|to| cost(from, to)))
+                        .collect();
+                    blocks.extend(Block::both_ways(a, b, poses[a].len(), costs));
+                }
+            }
+        }
+        let sizes: Vec<usize> = nodes.iter().map(Vec::len).collect();
+        let start = poses.iter().flatten().map(|p| cost(&self.start, p)).collect();
+        let instance = Instance::new(
+            &sizes,
+            Costs::Blocks(blocks),
+            Jump::Uniform(JUMP),
+            Ends::OpenFromCosts(start),
+        )?;
+        let trials = self.config.trials_per_cluster * nodes.len() as u64;
+        let solution = gtsp::solve(&instance, &Budget::trials(trials), seed)?;
+        let tour = &solution.tour;
+        Ok(tour.clusters.iter().zip(&tour.nodes).map(|(&c, &n)| nodes[c][n]).collect())
     }
 }

@@ -8,7 +8,7 @@
 //! stay in none: the coverage is measured over all points of the scan, so they count, and
 //! [`owners`] says which patch is nearest for those who want to show them.
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -62,6 +62,14 @@ pub struct Patch {
     pub points: Vec<u32>,
     /// Root mean square distance of the inliers from the plane. \[m\]
     pub rmse: f64,
+}
+
+impl Patch {
+    /// The patch seen from another frame, for a scan moved by the same pose.
+    #[must_use]
+    pub fn transformed(&self, pose: &Isometry3<f64>) -> Self {
+        Self { centre: pose * self.centre, normal: pose.rotation * self.normal, ..self.clone() }
+    }
 }
 
 /// The patches of a scan. A seed gives the same patches on every machine.

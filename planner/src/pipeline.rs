@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::collision::{self, CollisionError, Obstacle, ToolContact, World};
 use crate::cost::{self, Cost, CostKind, Effort, TaskTime};
 use crate::coverage;
-use crate::formulation::{self, FormulationConfig, Method, Stop};
+use crate::formulation::{self, FormulationConfig, FormulationError, Method, Stop};
 use crate::graph::{self, Graph, GraphConfig};
 use crate::layered::{self, Link};
 use crate::motion::{Leg, Mover};
@@ -35,7 +35,9 @@ pub struct Job {
     pub tool: Tool,
     /// Where the robot stands.
     pub stance: StanceChoice,
-    /// Solid things besides the scan, in the floor frame.
+    /// Points that were scanned but are not to be swept, in the floor frame. [m]
+    pub surroundings: Vec<Point3<f64>>,
+    /// Solid things besides the scan, posed in the floor frame.
     pub obstacles: Vec<Obstacle>,
     /// Where the arm is; `None`: its home posture. [rad] or [m]
     pub start: Option<JointVector>,
@@ -128,7 +130,6 @@ pub struct Figures {
 }
 
 /// A plan with all that led to it, in the root frame.
-#[derive(Debug)]
 pub struct Outcome {
     /// The plan. It may be published if `figures.verification.violations` is empty.
     pub plan: Plan,
@@ -152,6 +153,9 @@ pub enum PipelineError {
     /// The arm cannot be made from the robot.
     #[error(transparent)]
     Arm(#[from] ArmError),
+    /// No order was found.
+    #[error(transparent)]
+    Formulation(#[from] FormulationError),
     /// The collision world cannot be made.
     #[error(transparent)]
     Collision(#[from] CollisionError),
@@ -283,7 +287,7 @@ pub fn run(
             &job.formulation,
             job.seed,
         )
-    });
+    })?;
 
     progress.stage("layered graph and transfers", None);
     let velocity = cost::velocities(&arm, job.v_max);
@@ -400,10 +404,14 @@ impl Setting {
         let to_root = stance.pose().inverse();
         let scan = scan.transformed(&to_root);
         let patches: Vec<Patch> = patches.iter().map(|p| p.transformed(&to_root)).collect();
-        let obstacles: Vec<Obstacle> =
-            job.obstacles.iter().map(|o| o.transformed(&to_root)).collect();
-        let world =
-            World::new(robot, &arm, &job.tool, &scan.points, &obstacles, &job.collision)?;
+        let obstacles: Vec<Obstacle> = job
+            .obstacles
+            .iter()
+            .map(|o| Obstacle { pose: to_root * o.pose, ..o.clone() })
+            .collect();
+        let surroundings = job.surroundings.iter().map(|p| to_root * p);
+        let points: Vec<Point3<f64>> = scan.points.iter().copied().chain(surroundings).collect();
+        let world = World::new(robot, &arm, &job.tool, &points, &obstacles, &job.collision)?;
         Ok(Self { stance, arm, scan, patches, world })
     }
 

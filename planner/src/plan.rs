@@ -188,6 +188,13 @@ impl Plan {
         self.knots.get(knot)?.line.map(Point3::from)
     }
 
+    /// Whether the pad is on the surface in the segment that ends in a knot.
+    #[must_use]
+    pub fn on_surface(&self, knot: usize) -> bool {
+        let before = self.line(knot.saturating_sub(1));
+        before.is_some() && self.line(knot).is_some()
+    }
+
     /// A checksum of what the executor is asked to do: the same for the same motion.
     #[must_use]
     pub fn digest(&self) -> u64 {
@@ -205,7 +212,9 @@ impl Plan {
         if self.held.len() > MAX_HELD_JOINTS {
             return Err(PlanError::TooManyHeld { found: self.held.len() });
         }
-        let knots: Vec<Knot> = self.knots.iter().map(PlanKnot::wire).collect();
+        let knots: Vec<Knot> = (0..self.knots.len())
+            .map(|k| self.knots[k].wire(self.on_surface(k)))
+            .collect();
         let pose = self.base_pose();
         let (t, r) = (pose.translation.vector, pose.rotation.coords);
         let tool = serde_json::to_vec(&self.tool).unwrap_or_default();
@@ -228,10 +237,10 @@ impl Plan {
 }
 
 impl PlanKnot {
-    fn wire(&self) -> Knot {
+    fn wire(&self, on_surface: bool) -> Knot {
         let mut positions = [0.0; MAX_JOINTS];
         positions[..MAX_DOF].copy_from_slice(&self.q);
-        let contact = if self.line.is_some() { Contact::Contact } else { Contact::Transfer };
+        let contact = if on_surface { Contact::Contact } else { Contact::Transfer };
         Knot {
             time_from_start_ns: self.time_ns,
             positions,

@@ -68,7 +68,8 @@ const COLLISION_STEP: f64 = 0.02;
 const PAD_STEP: f64 = 0.01;
 
 /// Checks limits, times and collisions, and measures line, distance and swept coverage. `arm`
-/// and `scan` in the plan's stance: the root frame. `tick` is called once a segment.
+/// and `scan` in the plan's stance: the root frame; `already` marks points that were swept before
+/// the plan begins. `tick` is called once a segment.
 #[must_use]
 pub fn verify(
     plan: &Plan,
@@ -76,6 +77,7 @@ pub fn verify(
     world: &World,
     scan: &Scan,
     surface: &Surface,
+    already: &[bool],
     tick: &(dyn Fn() + Sync),
 ) -> Verification {
     let mut violations = kinematics(plan, arm);
@@ -98,7 +100,10 @@ pub fn verify(
         .collect();
     distances.sort_by(f64::total_cmp);
     let poses: Vec<Isometry3<f64>> = pads.iter().map(|p| p.pose).collect();
-    let swept = coverage::swept(scan, &poses, &plan.tool);
+    let mut swept = coverage::swept(scan, &poses, &plan.tool);
+    for (now, before) in swept.iter_mut().zip(already) {
+        *now |= before;
+    }
     let share = |of: &dyn Fn(usize) -> bool| {
         let total = (0..swept.len()).filter(|&i| of(i)).count();
         let hit = (0..swept.len()).filter(|&i| of(i) && swept[i]).count();
@@ -166,7 +171,7 @@ fn collisions(
             let contact = if on_surface { ToolContact::Allowed } else { ToolContact::Forbidden };
             let hit = (1..=steps).find_map(|s| {
                 let q = between(&a.q, &b.q, s as f64 / steps as f64);
-                exact.why_not(&q, contact).map(|hit| Violation {
+                exact.first_hit(&q, contact).map(|hit| Violation {
                     knot: k,
                     kind: ViolationKind::Collision,
                     detail: hit.to_string(),

@@ -87,7 +87,7 @@ fn summarise(plan: &Plan) -> Summary {
 
 fn tables(s: &Summary) -> String {
     let mut plan = Table::new();
-    plan.load_preset(UTF8_FULL_CONDENSED).set_header(["plan", ""]);
+    plan.load_style(UTF8_FULL_CONDENSED).set_header(["plan", ""]);
     plan.add_row(["robot", &format!("{} ({})", s.robot, s.fingerprint)]);
     plan.add_row(["base x, y, yaw", &format!("{:.3} {:.3} {:.3}", s.base[0], s.base[1], s.base[2])]);
     plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
@@ -99,7 +99,7 @@ fn tables(s: &Summary) -> String {
         plan.add_row(["continues another plan at knot", &knot.to_string()]);
     }
     let mut joints = Table::new();
-    joints.load_preset(UTF8_FULL_CONDENSED).set_header(["joint", "min", "max", "displacement"]);
+    joints.load_style(UTF8_FULL_CONDENSED).set_header(["joint", "min", "max", "displacement"]);
     for j in &s.joints {
         joints.add_row([
             j.name.clone(),

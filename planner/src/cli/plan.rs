@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use clap::Args;
 use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3};
@@ -11,7 +11,7 @@ use nullsweep_robot::{ArmSpec, JointVector, MAX_DOF, Robot, Side};
 
 use super::bars::Bars;
 use super::{OK, VIOLATIONS, write_json};
-use crate::collision::Obstacle;
+use crate::collision::{Obstacle, ObstacleShape};
 use crate::cost::CostKind;
 use crate::formulation::{FormulationConfig, Method};
 use crate::graph::GraphConfig;
@@ -109,8 +109,8 @@ pub(super) struct PlanArgs {
     /// Weight of turning against distance in the Curvature-GTSP (Eq. 4).
     #[arg(long, default_value_t = FormulationConfig::default().beta)]
     beta: f64,
-    /// Trials of the order's search.
-    #[arg(long, default_value_t = FormulationConfig::default().trials)]
+    /// Trials of the order's search for each patch.
+    #[arg(long, default_value_t = FormulationConfig::default().trials_per_cluster)]
     trials: u64,
     /// Seed of every random choice: the same seed gives the same plan.
     #[arg(long, default_value_t = 1)]
@@ -257,7 +257,7 @@ fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
 fn table(f: &Figures) -> Table {
     let v = &f.verification;
     let mut table = Table::new();
-    table.load_preset(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+    table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
     let mut row = |name: &str, value: String| {
         table.add_row([name.to_owned(), value]);
     };
@@ -285,9 +285,10 @@ fn table(f: &Figures) -> Table {
     table
 }
 
-/// The scan to sweep, and all else that was seen, in the floor frame.
+/// The scan to sweep, and all else that is there, in the floor frame.
 struct Scene {
     surface: Scan,
+    surroundings: Vec<Point3<f64>>,
     obstacles: Vec<Obstacle>,
 }
 
@@ -301,11 +302,13 @@ fn scene(args: &PlanArgs, bars: &Bars) -> anyhow::Result<Scene> {
         max: Point3::new(d, e, f),
     }).or(region);
     let (whole, _) = scan::clean(&placed, &CleanConfig::default())?;
-    let mut obstacles = vec![Obstacle::floor()];
+    let mut obstacles = vec![Obstacle::floor(Isometry3::identity())];
     if args.support_height > 0.0 {
         obstacles.push(table_under(&whole, args.support_height));
     }
-    let Some(region) = region else { return Ok(Scene { surface: whole, obstacles }) };
+    let Some(region) = region else {
+        return Ok(Scene { surface: whole, surroundings: Vec::new(), obstacles });
+    };
     let surface = whole.cropped(&region);
     ensure!(
         !surface.points.is_empty(),
@@ -313,10 +316,8 @@ fn scene(args: &PlanArgs, bars: &Bars) -> anyhow::Result<Scene> {
         region.min,
         region.max
     );
-    let rest: Vec<Point3<f64>> =
-        whole.points.iter().filter(|p| !region.contains(p)).copied().collect();
-    obstacles.push(Obstacle::points(rest));
-    Ok(Scene { surface, obstacles })
+    let surroundings = whole.points.iter().filter(|p| !region.contains(p)).copied().collect();
+    Ok(Scene { surface, surroundings, obstacles })
 }
 
 fn simulated(demo: Demo, seed: u64) -> (PlacedScan, Option<CropBox>) {
@@ -391,7 +392,12 @@ fn table_under(scan: &Scan, height: f64) -> Obstacle {
             high[axis] = high[axis].max(p[axis] + TABLE_RIM);
         }
     }
-    Obstacle::cuboid("table", low, high)
+    Obstacle {
+        name: "table".into(),
+        shape: ObstacleShape::Box { half_extents: (high - low) * 0.5 },
+        pose: Isometry3::from(nalgebra::center(&low, &high).coords),
+        carries_robot: false,
+    }
 }
 
 fn job(args: &PlanArgs, scene: &Scene) -> anyhow::Result<Job> {
@@ -430,6 +436,7 @@ fn job(args: &PlanArgs, scene: &Scene) -> anyhow::Result<Job> {
         arm: spec(args)?,
         tool,
         stance,
+        surroundings: scene.surroundings.clone(),
         obstacles: scene.obstacles.clone(),
         start: (!args.start.is_empty()).then_some(start),
         after,
@@ -443,7 +450,7 @@ fn job(args: &PlanArgs, scene: &Scene) -> anyhow::Result<Job> {
             radius: args.radius,
             ..GraphConfig::default()
         },
-        formulation: FormulationConfig { beta: args.beta, trials: args.trials },
+        formulation: FormulationConfig { beta: args.beta, trials_per_cluster: args.trials },
         collision: crate::collision::Options::default(),
         seed: args.seed,
     })
