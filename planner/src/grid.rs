@@ -56,6 +56,11 @@ impl Grid {
         grid
     }
 
+    /// The points' indices sorted by cell: the order in which neighbours lie together.
+    pub(crate) fn order(&self) -> Vec<usize> {
+        self.sorted.iter().map(|(_, index)| *index as usize).collect()
+    }
+
     /// Calls `visit(index, point, squared distance)` for every point within `radius` of `centre`,
     /// in an order that depends on the points alone.
     pub(crate) fn within(

@@ -1,1 +1,219 @@
-//! Placeholder: replaced by its stage.
+//! The surface between the points of a scan: what tool paths follow and deviations refer to.
+//!
+//! Two patch centres 5–10 cm apart on a curved body span a chord that runs 4–13 mm inside it.
+//! [`Surface::line`] lays that chord onto the surface. The surface is a moving least squares fit
+//! whose weights fade out smoothly, so that points and normals along a line vary smoothly.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+use crate::fit::{HeightFit, PlaneFit, weight};
+use crate::grid::Grid;
+use crate::scan::Scan;
+
+/// Radius of the fit on smoothed points; at least four spacings are taken. \[m\]
+const FIT_RADIUS: f64 = 0.015;
+
+/// Radius of the fit on raw points, which still carry the sensor's noise. \[m\]
+const RAW_RADIUS: f64 = 0.020;
+
+/// Farthest that a point is projected from. \[m\]
+const REACH: f64 = 0.04;
+
+/// Widest hole that still counts as surface, from a point to the nearest of the scan; at least
+/// three spacings are taken. \[m\]
+const GAP: f64 = 0.010;
+
+/// Rounds of projecting and fitting anew at the foot point.
+const ROUNDS: usize = 3;
+
+/// Fewest points that make a piece of surface.
+const MIN_POINTS: usize = 6;
+
+/// A point of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Where, in the scan's frame. \[m\]
+    pub point: Point3<f64>,
+    /// The outward normal there.
+    pub normal: UnitVector3<f64>,
+}
+
+/// The surface of a scan, ready for projections.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    grid: Grid,
+    normals: Vec<UnitVector3<f64>>,
+    raw_grid: Grid,
+    raw: Vec<Point3<f64>>,
+    raw_normals: Vec<UnitVector3<f64>>,
+    radius: f64,
+    raw_radius: f64,
+    gap: f64,
+    spacing: f64,
+}
+
+impl Surface {
+    /// The surface of a scan.
+    #[must_use]
+    pub fn new(scan: &Scan) -> Self {
+        let radius = FIT_RADIUS.max(4.0 * scan.spacing);
+        let raw_radius = RAW_RADIUS.max(4.0 * scan.spacing);
+        // In the grid's own order neighbours lie together in memory.
+        let order = Grid::new(&scan.points, radius).order();
+        let points: Vec<_> = order.iter().map(|&i| scan.points[i]).collect();
+        let raw_order = Grid::new(&scan.raw, raw_radius).order();
+        let raw: Vec<_> = raw_order.iter().map(|&i| scan.raw[i]).collect();
+        Self {
+            grid: Grid::new(&points, radius),
+            normals: order.iter().map(|&i| scan.normals[i]).collect(),
+            raw_grid: Grid::new(&raw, raw_radius),
+            raw_normals: raw_order.iter().map(|&i| scan.normals[i]).collect(),
+            raw,
+            radius,
+            raw_radius,
+            gap: GAP.max(3.0 * scan.spacing),
+            spacing: scan.spacing,
+        }
+    }
+
+    /// The foot of a point's perpendicular on the surface, on the sheet whose normal agrees with
+    /// `hint` to within about 60°. `None` farther than 4 cm from the surface or over a hole.
+    #[must_use]
+    pub fn project(&self, point: &Point3<f64>, hint: &UnitVector3<f64>) -> Option<SurfacePoint> {
+        let agrees = |index: u32| self.normals[index as usize].dot(hint) > 0.5;
+        let (nearest, _) = self.grid.nearest(point, REACH, agrees)?;
+        // The height of the nearest point's tangent plane is a first guess of the foot.
+        let mut normal = self.normals[nearest as usize];
+        let mut foot = *point;
+        self.grid.within(point, REACH, |index, position, _| {
+            if index == nearest {
+                foot = point + normal.scale((position - point).dot(&normal));
+            }
+        });
+        let mut result = None;
+        for _ in 0..ROUNDS {
+            let found = self.fit(&foot, &normal, hint)?;
+            normal = found.normal;
+            foot = point + normal.scale((found.point - point).dot(&normal));
+            result = Some(found);
+        }
+        // The last fit stands at the last foot but one, a vanishing step away.
+        result.map(|found| SurfacePoint { point: foot, normal: found.normal })
+    }
+
+    /// The line on the surface under the chord from `a` to `b`, at most about `step` apart, both
+    /// ends exactly as given. Between them the ends' offsets from the surface fade out linearly, as
+    /// the plane of a patch does not quite meet the local surface. `None` where the chord leaves
+    /// the surface or the sheet.
+    #[must_use]
+    pub fn line(&self, a: &SurfacePoint, b: &SurfacePoint, step: f64) -> Option<Vec<SurfacePoint>> {
+        let chord = b.point - a.point;
+        let pieces = (chord.norm() / step).ceil().max(1.0) as usize;
+        let mut line = Vec::with_capacity(pieces + 1);
+        let mut at = Vec::with_capacity(pieces + 1);
+        for i in 0..=pieces {
+            let t = i as f64 / pieces as f64;
+            let hint = blend(&a.normal, &b.normal, t)?;
+            line.push(self.project(&(a.point + chord * t), &hint)?);
+            at.push(t);
+        }
+        self.fill(&mut line, &mut at, step)?;
+
+        let start = (a.point - line[0].point, *a.normal - *line[0].normal);
+        let last = line[line.len() - 1];
+        let end = (b.point - last.point, *b.normal - *last.normal);
+        for (found, &t) in line.iter_mut().zip(&at) {
+            found.point += start.0 * (1.0 - t) + end.0 * t;
+            let normal = *found.normal + start.1 * (1.0 - t) + end.1 * t;
+            found.normal = UnitVector3::try_new(normal, 1e-6)?;
+        }
+        line[0] = *a;
+        let last = line.len() - 1;
+        line[last] = *b;
+        Some(line)
+    }
+
+    /// Distance from a point to the scanned surface: to the plane through the raw points around
+    /// its foot, and beyond their border also along the plane. Infinite farther than 10 cm away.
+    /// \[m\]
+    #[must_use]
+    pub fn distance(&self, point: &Point3<f64>) -> f64 {
+        let Some((nearest, squared)) = self.raw_grid.nearest(point, 0.1, |_| true) else {
+            return f64::INFINITY;
+        };
+        let sheet = self.raw_normals[nearest as usize];
+        let foot = point + sheet.scale((self.raw[nearest as usize] - point).dot(&sheet));
+        let mut fit = PlaneFit::new(foot);
+        let mut count = 0;
+        let mut border = f64::INFINITY;
+        self.raw_grid.within(&foot, self.raw_radius, |index, neighbour, squared| {
+            if self.raw_normals[index as usize].dot(&sheet) > 0.5 {
+                count += 1;
+                border = border.min(squared);
+                fit.add(neighbour, weight(squared / self.raw_radius.powi(2)));
+            }
+        });
+        match fit.solve().filter(|_| count >= MIN_POINTS) {
+            Some(plane) => {
+                let height = (point - plane.centroid).dot(&plane.normal);
+                // Noise puts the nearest raw point off the plane too; two spacings allow for it.
+                let beyond = (border.sqrt() - 2.0 * self.spacing.max(0.002)).max(0.0);
+                height.hypot(beyond)
+            }
+            None => squared.sqrt(),
+        }
+    }
+
+    /// The surface on the line through `foot` along `normal`.
+    fn fit(
+        &self,
+        foot: &Point3<f64>,
+        normal: &UnitVector3<f64>,
+        hint: &UnitVector3<f64>,
+    ) -> Option<SurfacePoint> {
+        let mut fit = HeightFit::new(*foot, normal, self.radius);
+        let mut count = 0;
+        let mut border = f64::INFINITY;
+        let scale = 1.0 / (self.radius * self.radius);
+        self.grid.within(foot, self.radius, |index, position, squared| {
+            // Fading from 78° to 53°, as a hard bound would make the line jump.
+            let agreement = ((self.normals[index as usize].dot(hint) - 0.2) / 0.4).clamp(0.0, 1.0);
+            if agreement > 0.0 {
+                count += 1;
+                border = border.min(squared);
+                fit.add(position, agreement * weight(squared * scale));
+            }
+        });
+        if count < MIN_POINTS || border > self.gap * self.gap {
+            return None;
+        }
+        let (point, found) = fit.solve()?;
+        (found.dot(hint) > 0.0).then_some(SurfacePoint { point, normal: found })
+    }
+
+    /// Puts projections of midpoints wherever neighbours of a line lie more than one and a half
+    /// steps apart, as they do where the surface falls away under the chord.
+    fn fill(&self, line: &mut Vec<SurfacePoint>, at: &mut Vec<f64>, step: f64) -> Option<()> {
+        let mut i = 0;
+        let mut budget = 4 * line.len();
+        while i + 1 < line.len() {
+            let (a, b) = (line[i], line[i + 1]);
+            if (b.point - a.point).norm() <= 1.5 * step {
+                i += 1;
+                continue;
+            }
+            budget = budget.checked_sub(1)?;
+            let middle = nalgebra::center(&a.point, &b.point);
+            let found = self.project(&middle, &blend(&a.normal, &b.normal, 0.5)?)?;
+            line.insert(i + 1, found);
+            at.insert(i + 1, 0.5 * (at[i] + at[i + 1]));
+        }
+        Some(())
+    }
+}
+
+/// A direction between two; `None` if they are opposite.
+fn blend(a: &UnitVector3<f64>, b: &UnitVector3<f64>, t: f64) -> Option<UnitVector3<f64>> {
+    let mixed: Vector3<f64> = a.scale(1.0 - t) + b.scale(t);
+    UnitVector3::try_new(mixed, 1e-3)
+}
