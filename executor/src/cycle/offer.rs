@@ -1,0 +1,160 @@
+//! Does an admitted plan fit the moment? The join rules.
+//!
+//! Whatever can be known before the running plan is touched is judged here, so that a plan that
+//! does not fit leaves it alone: where a stop will end is predicted with the very arithmetic of
+//! the stop.
+
+use std::sync::Arc;
+
+use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanId, Reason};
+
+use super::{Output, State, StopCause, Turn, Waiting};
+use crate::Joints;
+use crate::admit::{Join, Rejection, ValidPlan};
+use crate::guard::Guard;
+use crate::path::Path;
+
+impl State {
+    /// Accepts or rejects a plan, with exactly one event for it.
+    pub(super) fn consider(
+        &mut self,
+        plan: Arc<ValidPlan>,
+        now_ns: u64,
+        guard: &Guard,
+        out: &mut Output,
+    ) {
+        let id = plan.id();
+        let turn = match self.turn(&plan, now_ns, guard) {
+            Ok(turn) => turn,
+            Err(why) => {
+                out.tell(id, EventKind::Rejected, why);
+                out.retire(plan);
+                return;
+            }
+        };
+        out.tell(id, EventKind::Accepted, Rejection::new(Reason::None));
+        self.fault = Fault::None;
+        let Some(turn) = turn else {
+            self.begin(plan, self.scale, guard, out);
+            return;
+        };
+        if turn != Turn::After {
+            // The newest plan wins over what waited for its turn.
+            self.end_waiting(EventKind::Superseded, Reason::None, out);
+        }
+        if turn == Turn::Stopped {
+            self.stop = Some(StopCause::Replace);
+            self.mode = Mode::Stopping;
+        }
+        // There is room: `turn` has looked, or the queue has just been emptied.
+        if let Err(waiting) = self.queue.push_back(Waiting { plan, turn }) {
+            out.tell(id, EventKind::Aborted, Rejection::new(Reason::QueueFull));
+            out.retire(waiting.plan);
+        }
+    }
+
+    /// Starts a plan from where the arm holds.
+    pub(super) fn begin(
+        &mut self,
+        plan: Arc<ValidPlan>,
+        rate: f64,
+        guard: &Guard,
+        out: &mut Output,
+    ) {
+        out.tell(plan.id(), EventKind::Started, Rejection::new(Reason::None));
+        self.path = Some(Path::start(plan, &self.q, rate, guard));
+        self.live = true;
+        self.mode = Mode::Executing;
+    }
+
+    /// Whether the plan's first knot is where the arm holds.
+    pub(super) fn starts_at(
+        plan: &ValidPlan,
+        holds: &Joints,
+        guard: &Guard,
+    ) -> Result<(), Rejection> {
+        let first = plan.knots().first().map_or(*holds, |k| k.q);
+        match guard.farthest(holds, &first, guard.start_tolerance) {
+            None => Ok(()),
+            Some((joint, apart)) => Err(Rejection::new(Reason::Start)
+                .knot(0)
+                .joint(joint)
+                .value(apart, guard.start_tolerance)),
+        }
+    }
+
+    /// When the plan's turn comes, `None` for at once.
+    fn turn(
+        &self,
+        plan: &ValidPlan,
+        now_ns: u64,
+        guard: &Guard,
+    ) -> Result<Option<Turn>, Rejection> {
+        let not_ready = Rejection::new(Reason::NotReady);
+        let stale = self.watch.age(now_ns) >= guard.stale_ns;
+        let leaving = !matches!(self.stop, None | Some(StopCause::Replace));
+        if self.disabled || self.shutdown || stale || leaving {
+            return Err(not_ready);
+        }
+        match (self.mode, self.path.as_ref()) {
+            (Mode::Init | Mode::Fault, _) => Err(not_ready),
+            (_, None) => match plan.join() {
+                Join::Knot { .. } => Err(Rejection::new(Reason::JoinPlan)),
+                Join::Stop | Join::After => Self::starts_at(plan, &self.q, guard).map(|()| None),
+            },
+            (_, Some(path)) => match plan.join() {
+                Join::Stop => {
+                    let holds = path.predict_stop(guard).ok_or(not_ready)?;
+                    Self::starts_at(plan, &holds, guard).map(|()| Some(Turn::Stopped))
+                }
+                Join::After => self.after(plan, path, guard).map(|()| Some(Turn::After)),
+                Join::Knot { plan: joined, knot } => {
+                    self.at_knot(plan, path, joined, knot, guard).map(|()| Some(Turn::Knot(knot)))
+                }
+            },
+        }
+    }
+
+    fn after(&self, plan: &ValidPlan, path: &Path, guard: &Guard) -> Result<(), Rejection> {
+        if self.queue.is_full() {
+            return Err(Rejection::new(Reason::QueueFull));
+        }
+        let last = self.queue.back().and_then(|w| w.plan.knots().last());
+        let holds = last.map_or_else(|| path.end(), |k| k.q);
+        Self::starts_at(plan, &holds, guard)
+    }
+
+    fn at_knot(
+        &self,
+        plan: &ValidPlan,
+        path: &Path,
+        joined: PlanId,
+        knot: usize,
+        guard: &Guard,
+    ) -> Result<(), Rejection> {
+        if self.stop.is_some() || path.plan().id() != joined {
+            return Err(Rejection::new(Reason::JoinPlan));
+        }
+        let passed = Rejection::new(Reason::JoinKnot).value(knot as f64, path.knot() as f64);
+        let at = path.upcoming(knot).ok_or(passed)?;
+        let Some(first) = plan.knots().first() else {
+            return Err(Rejection::new(Reason::Malformed));
+        };
+        let start = Rejection::new(Reason::Start).knot(0);
+        if let Some((joint, apart)) = guard.farthest(&at.q, &first.q, guard.join_tolerance) {
+            return Err(start.joint(joint).value(apart, guard.join_tolerance));
+        }
+        // Curves that carry velocities must also meet in them, within one cycle's acceleration.
+        let cubic = nullsweep_ipc_types::Interpolation::Cubic;
+        if plan.interpolation() == cubic && path.plan().interpolation() == cubic {
+            let bound = guard.stop_acceleration * guard.period();
+            for j in 0..guard.dof {
+                let step = (first.v[j] - at.v[j]).abs();
+                if !(step <= bound) {
+                    return Err(start.joint(j).value(step, bound));
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,267 @@
+//! Is the endpoint there, sound, and following?
+
+use crate::MAX_DOF;
+use nullsweep_ipc_types::{EventKind, Fault, Mode, Reason, status};
+
+use super::{Output, REMEMBERED, State, StopCause};
+use crate::Joints;
+use crate::guard::Guard;
+
+/// Windows whose mean rate is judged, and the length of each. \[ns\]
+const RATE_WINDOWS: usize = 3;
+const RATE_WINDOW_NS: u64 = 200_000_000;
+/// How near commanded and measured positions must be for the arm to count as held. \[rad\]
+const HELD_WITHIN: f64 = 0.01;
+
+/// A joint state as the loop reads it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// When it was measured. \[ns\]
+    pub stamp_ns: u64,
+    /// The newest setpoint that was in force then, 0 for none.
+    pub setpoint_sequence: u64,
+    /// How many joints the endpoint has.
+    pub joint_count: usize,
+    /// Measured positions. \[rad\] or \[m\]
+    pub q: Joints,
+    /// Bits of [`status`].
+    pub status: u32,
+}
+
+/// What supervision remembers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Watch {
+    newest: Option<Measured>,
+    fresh_ns: u64,
+    following: u32,
+    unheard: u32,
+    window_start_ns: u64,
+    window_cycles: u32,
+    rates: [f64; RATE_WINDOWS],
+    windows: u64,
+}
+
+/// How a fault ends the motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Reaction {
+    /// Slow down on the path.
+    Brake,
+    /// The motors are off or not ours: follow where the arm goes, so that nothing jumps later.
+    Follow,
+}
+
+impl Watch {
+    pub(super) fn measured(&self) -> Option<&Measured> {
+        self.newest.as_ref()
+    }
+
+    pub(super) fn age(&self, now_ns: u64) -> u64 {
+        if self.newest.is_some() { now_ns.saturating_sub(self.fresh_ns) } else { u64::MAX }
+    }
+
+    /// Takes a state in; what is wrong with it. A stamp that does not rise is no new state.
+    fn take(&mut self, measured: Measured, now_ns: u64, guard: &Guard) -> Option<Fault> {
+        if self.newest.is_some_and(|n| measured.stamp_ns <= n.stamp_ns) {
+            return None;
+        }
+        if measured.joint_count != guard.dof {
+            return Some(Fault::JointCount);
+        }
+        if !measured.q[..guard.dof].iter().all(|q| q.is_finite()) {
+            return Some(Fault::NotFinite);
+        }
+        let mut own = measured;
+        own.q[guard.dof..].fill(0.0);
+        self.newest = Some(own);
+        // A stamp from the future must not make a dead endpoint look alive.
+        self.fresh_ns = measured.stamp_ns.min(now_ns);
+        None
+    }
+
+    /// What the endpoint says about itself.
+    fn endpoint(&self) -> Option<(Fault, Reaction)> {
+        let status = self.newest?.status;
+        if status & status::ERROR != 0 {
+            Some((Fault::Endpoint, Reaction::Follow))
+        } else if status & status::HALTED != 0 {
+            Some((Fault::Halted, Reaction::Follow))
+        } else if status & status::CALIBRATED == 0 {
+            Some((Fault::NotCalibrated, Reaction::Follow))
+        } else {
+            None
+        }
+    }
+
+    /// Counts cycles in windows; whether the mean over all windows is too low.
+    fn rate_is_low(&mut self, now_ns: u64, guard: &Guard) -> bool {
+        if self.window_start_ns == 0 {
+            self.window_start_ns = now_ns;
+            return false;
+        }
+        self.window_cycles += 1;
+        let elapsed = now_ns.saturating_sub(self.window_start_ns);
+        if elapsed < RATE_WINDOW_NS {
+            return false;
+        }
+        let slot = (self.windows % RATE_WINDOWS as u64) as usize;
+        self.rates[slot] = f64::from(self.window_cycles) / (elapsed as f64 * 1e-9);
+        self.windows += 1;
+        self.window_start_ns = now_ns;
+        self.window_cycles = 0;
+        let mean = self.rates.iter().sum::<f64>() / RATE_WINDOWS as f64;
+        self.windows >= RATE_WINDOWS as u64 && mean < guard.min_rate
+    }
+}
+
+impl State {
+    /// Takes the newest state in and reacts to what is wrong.
+    pub(super) fn supervise(
+        &mut self,
+        measured: Option<Measured>,
+        now_ns: u64,
+        guard: &Guard,
+        out: &mut Output,
+    ) {
+        let bad = measured.and_then(|m| self.watch.take(m, now_ns, guard));
+        let low_rate = self.watch.rate_is_low(now_ns, guard);
+        match self.mode {
+            Mode::Init => self.initialise(bad, now_ns, guard),
+            Mode::Fault => self.follow_if_limp(guard),
+            Mode::Hold | Mode::Executing | Mode::Paused | Mode::Stopping => {
+                let age = self.watch.age(now_ns);
+                let fault = bad
+                    .map(|fault| (fault, Reaction::Brake))
+                    .or_else(|| self.watch.endpoint().filter(|_| !self.is_off()))
+                    .or_else(|| self.unheard(measured.as_ref(), guard))
+                    .or_else(|| self.strays(measured.as_ref(), guard))
+                    .or((age >= guard.lost_ns)
+                        .then_some((Fault::CommunicationLost, Reaction::Brake)))
+                    .or(low_rate.then_some((Fault::LowRate, Reaction::Brake)));
+                if let Some((fault, reaction)) = fault {
+                    self.fail(fault, reaction, out);
+                } else if age >= guard.stale_ns && self.path.is_some() {
+                    self.stop_for_stale_state(out);
+                }
+                self.follow_if_limp(guard);
+            }
+        }
+    }
+
+    /// Latches a fault: every plan ends now, the arm slows down on its path or is followed.
+    fn fail(&mut self, fault: Fault, reaction: Reaction, out: &mut Output) {
+        self.end_all(EventKind::Aborted, Reason::Fault, out);
+        self.mode = Mode::Fault;
+        self.fault = fault;
+        self.stop = None;
+        self.paused = false;
+        if reaction == Reaction::Follow {
+            self.drop_path(out);
+        }
+    }
+
+    /// Latches a fault of the setpoint itself: the arm holds the last good one.
+    pub(super) fn freeze(&mut self, fault: Fault, out: &mut Output) {
+        self.fail(fault, Reaction::Follow, out);
+    }
+
+    /// Whether the cause of the latched fault is gone.
+    pub(super) fn is_cleared(&self, now_ns: u64, guard: &Guard) -> bool {
+        self.path.is_none()
+            && self.watch.age(now_ns) < guard.stale_ns
+            && self.watch.endpoint().is_none()
+    }
+
+    /// Forgets what was counted before a fault.
+    pub(super) fn forget(&mut self) {
+        self.watch.following = 0;
+        self.watch.unheard = 0;
+        self.watch.windows = 0;
+        self.watch.window_start_ns = 0;
+        self.watch.window_cycles = 0;
+    }
+
+    /// Waits for a sound endpoint; meanwhile commands where the arm is, so that nothing jumps.
+    fn initialise(&mut self, bad: Option<Fault>, now_ns: u64, guard: &Guard) {
+        let Some(measured) = self.watch.newest else {
+            self.fault = bad.unwrap_or(Fault::None);
+            return;
+        };
+        if self.has_position {
+            self.creep(&measured.q, guard);
+        } else {
+            self.q = measured.q;
+            self.has_position = true;
+        }
+        let stale = self.watch.age(now_ns) >= guard.stale_ns;
+        let trouble = bad
+            .or(self.watch.endpoint().map(|(fault, _)| fault))
+            .or(stale.then_some(Fault::StaleState));
+        self.fault = trouble.unwrap_or(Fault::None);
+        let near = (0..guard.dof).all(|j| (self.q[j] - measured.q[j]).abs() <= HELD_WITHIN);
+        if trouble.is_none() && near {
+            self.mode = Mode::Hold;
+            self.forget();
+        }
+    }
+
+    fn follow_if_limp(&mut self, guard: &Guard) {
+        let limp = match self.mode {
+            Mode::Fault => {
+                matches!(self.fault, Fault::Halted | Fault::NotCalibrated | Fault::Endpoint)
+            }
+            _ => self.is_off(),
+        };
+        if limp && let Some(measured) = self.watch.newest {
+            self.creep(&measured.q, guard);
+        }
+    }
+
+    /// Moves the commanded position towards a measured one, no faster than each joint may.
+    fn creep(&mut self, to: &Joints, guard: &Guard) {
+        for (j, bound) in guard.used().iter().enumerate() {
+            let step = bound.velocity * guard.period();
+            self.q[j] += (to[j] - self.q[j]).clamp(-step, step);
+        }
+        self.v = [0.0; MAX_DOF];
+    }
+
+    fn stop_for_stale_state(&mut self, out: &mut Output) {
+        match self.stop {
+            Some(StopCause::Replace) | None => {
+                self.end_waiting(EventKind::Aborted, Reason::Fault, out);
+                self.stop = Some(StopCause::Stale);
+                self.mode = Mode::Stopping;
+                self.fault = Fault::StaleState;
+            }
+            Some(StopCause::Operator | StopCause::Stale | StopCause::Shutdown) => {}
+        }
+    }
+
+    /// The endpoint hears no setpoints although they flow.
+    fn unheard(&mut self, measured: Option<&Measured>, guard: &Guard) -> Option<(Fault, Reaction)> {
+        if let Some(m) = measured {
+            let timeout = m.status & status::SETPOINT_TIMEOUT != 0 && !self.is_off();
+            self.watch.unheard = if timeout { self.watch.unheard.saturating_add(1) } else { 0 };
+        }
+        (self.watch.unheard >= guard.debounce).then_some((Fault::Endpoint, Reaction::Follow))
+    }
+
+    /// The arm does not follow. Measured positions are compared with the setpoint that was in
+    /// force then, so a known delay is no error.
+    fn strays(&mut self, measured: Option<&Measured>, guard: &Guard) -> Option<(Fault, Reaction)> {
+        let behind = self.sequence.checked_sub(measured?.setpoint_sequence)?;
+        let heard = measured?.setpoint_sequence > 0;
+        if !heard || behind >= REMEMBERED as u64 || self.is_off() {
+            return None;
+        }
+        let newest = self.watch.newest?;
+        let slot = (newest.setpoint_sequence % REMEMBERED as u64) as usize;
+        let far = (0..guard.dof).any(|j| {
+            let speed = self.remembered_v[slot][j].abs();
+            let error = (self.remembered[slot][j] - newest.q[j]).abs();
+            !(error <= guard.following_error + guard.following_lag * speed)
+        });
+        self.watch.following = if far { self.watch.following.saturating_add(1) } else { 0 };
+        (self.watch.following >= guard.debounce).then_some((Fault::FollowingError, Reaction::Brake))
+    }
+}

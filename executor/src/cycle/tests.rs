@@ -1,0 +1,564 @@
+//! States and events, the join rules, and supervision, on a virtual clock.
+
+use nullsweep_ipc_types::{EventKind, Fault, JoinRule, Mode, PlanId, Reason, Verdict, status};
+
+use super::{Event, Measured, Order};
+use crate::guard::tests::pr2;
+use crate::testing::{HOME, MS, Sim, cubic, joining, moved, plan};
+use crate::{Joints, MAX_DOF};
+use EventKind::{Aborted, Accepted, Finished, Rejected, Started, Superseded};
+
+fn id(number: u64) -> PlanId {
+    PlanId { epoch: 1000, number }
+}
+
+/// Joint 0 there and on: 0.4 rad in 0.4 s, knots each 50 ms.
+fn line(from: Joints) -> Vec<(u64, Joints)> {
+    (0..=8u32).map(|i| (u64::from(i) * 50 * MS, moved(from, 0, 0.05 * f64::from(i)))).collect()
+}
+
+fn only(events: &[Event], kind: EventKind) -> Event {
+    let found: Vec<_> = events.iter().filter(|e| e.kind == kind).collect();
+    assert_eq!(found.len(), 1, "{kind} in {events:?}");
+    *found[0]
+}
+
+#[test]
+fn runs_a_plan_to_its_exact_end() {
+    for kind in ["linear", "cubic"] {
+        let mut sim = Sim::holding(pr2());
+        let guard = sim.guard;
+        let points = line(HOME);
+        let plan = if kind == "cubic" {
+            cubic(&guard, 1, &points)
+        } else {
+            plan(&guard, 1, JoinRule::StopThenStart, &points)
+        };
+        sim.offer(plan);
+        assert_eq!(sim.mode(), Mode::Executing);
+        sim.run(398);
+        assert_eq!(sim.mode(), Mode::Executing);
+        sim.run(1);
+        assert_eq!(sim.story(1), [Accepted, Started, Finished], "{kind}");
+        assert_eq!(sim.mode(), Mode::Hold);
+        assert_eq!(sim.last, Some(points[8].1), "the last knot is hit to the bit");
+        sim.run(50);
+        assert_eq!(sim.last, Some(points[8].1));
+        assert_eq!(sim.last_v, [0.0; MAX_DOF]);
+    }
+}
+
+#[test]
+fn a_connector_leads_to_the_first_knot() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let from = moved(moved(HOME, 0, 0.015), 5, -0.01);
+    sim.offer(cubic(&guard, 1, &line(from)));
+    sim.top_acceleration = 0.0;
+    let mut cycles = 0;
+    while sim.state.snapshot().plan_time_ns == 0 {
+        sim.run(1);
+        cycles += 1;
+    }
+    // Rest to rest over 0.015 rad at 2 rad/s² takes 173 ms.
+    assert!((172..=174).contains(&cycles), "{cycles}");
+    sim.run_until(Mode::Hold, 2000);
+    assert_eq!(sim.last, Some(moved(from, 0, 0.4)));
+
+    let far = moved(HOME, 3, 0.0201);
+    let e = only(&sim.offer(plan(&guard, 2, JoinRule::StopThenStart, &line(far))), Rejected);
+    assert_eq!((e.why.reason, e.why.joint), (Reason::Start, 0), "joint 0 has moved on by 0.4");
+    assert_eq!(sim.mode(), Mode::Hold);
+}
+
+#[test]
+fn whole_turns_of_a_continuous_joint_are_no_distance() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let turned = moved(HOME, 6, 3.0 * core::f64::consts::TAU);
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(turned)));
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(sim.story(1), [Accepted, Started, Finished]);
+    let last = sim.last.unwrap();
+    assert!((last[6] - HOME[6]).abs() < 1e-9, "it does not unwind: {}", last[6]);
+}
+
+#[test]
+fn joins_at_a_knot_without_a_stop() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let old = line(HOME);
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &old));
+    sim.run(120);
+    let at = old[5].1;
+    let new = vec![(0, at), (100 * MS, moved(at, 1, 0.1)), (300 * MS, moved(at, 1, 0.2))];
+    assert_eq!(only(&sim.offer(joining(&guard, 2, &new, id(1), 5)), Accepted).plan, id(2));
+    for cycle in 123..=250 {
+        assert_eq!(sim.story(2), [Accepted], "cycle {cycle}");
+        sim.run(1);
+    }
+    // The plan's 250th cycle is the knot's time: it is commanded exactly and the new plan has begun.
+    assert_eq!(sim.story(1), [Accepted, Started, Superseded]);
+    assert_eq!(sim.story(2), [Accepted, Started]);
+    assert_eq!(sim.last, Some(at));
+    sim.run(100);
+    assert_eq!(sim.last, Some(moved(at, 1, 0.1)));
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(sim.story(2), [Accepted, Started, Finished]);
+}
+
+#[test]
+fn a_join_that_does_not_fit_leaves_the_plan_alone() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let old = line(HOME);
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &old));
+    sim.run(120);
+    let from = |k: usize| line(old[k].1);
+    let cases = [
+        (joining(&guard, 2, &from(2), id(1), 2), Reason::JoinKnot),
+        (joining(&guard, 3, &from(5), id(1), 9), Reason::JoinKnot),
+        (joining(&guard, 4, &from(5), id(7), 5), Reason::JoinPlan),
+        (joining(&guard, 5, &from(4), id(1), 5), Reason::Start),
+        (plan(&guard, 6, JoinRule::StopThenStart, &from(8)), Reason::Start),
+        (plan(&guard, 7, JoinRule::AfterCurrent, &from(7)), Reason::Start),
+    ];
+    for (offer, reason) in cases {
+        let events = sim.offer(offer);
+        assert_eq!(only(&events, Rejected).why.reason, reason);
+        assert_eq!(events.len(), 1);
+    }
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(sim.story(1), [Accepted, Started, Finished]);
+    assert_eq!(sim.last, Some(old[8].1));
+}
+
+#[test]
+fn stop_then_start_stops_where_it_was_predicted() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(HOME)));
+    sim.run(150);
+    // 1 rad/s at 10 rad/s² is 0.05 rad past the 0.151 rad of this cycle, within a step.
+    let stop = moved(HOME, 0, 0.2005);
+    let events = sim.offer(plan(&guard, 2, JoinRule::StopThenStart, &line(stop)));
+    assert_eq!(events.iter().map(|e| e.kind).collect::<Vec<_>>(), [Accepted]);
+    assert_eq!(sim.mode(), Mode::Stopping);
+    // Another one that would not fit is rejected while the first waits.
+    let away = moved(stop, 0, 0.1);
+    only(&sim.offer(plan(&guard, 3, JoinRule::StopThenStart, &line(away))), Rejected);
+    sim.run_until(Mode::Executing, 110);
+    assert_eq!(sim.story(1), [Accepted, Started, Superseded]);
+    assert_eq!(sim.story(2), [Accepted, Started]);
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(sim.last, Some(moved(stop, 0, 0.4)));
+}
+
+#[test]
+fn plans_wait_in_line_and_the_newest_wins() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let points = line(HOME);
+    let back: Vec<_> = (0..9).map(|i| (points[i].0, points[8 - i].1)).collect();
+    sim.offer(plan(&guard, 1, JoinRule::AfterCurrent, &points));
+    for (number, points) in [(2, &back), (3, &points), (4, &back), (5, &points)] {
+        only(&sim.offer(plan(&guard, number, JoinRule::AfterCurrent, points)), Accepted);
+    }
+    let full = sim.offer(plan(&guard, 6, JoinRule::AfterCurrent, &back));
+    assert_eq!(only(&full, Rejected).why.reason, Reason::QueueFull);
+    sim.run(400);
+    assert_eq!(sim.story(1), [Accepted, Started, Finished]);
+    assert_eq!(sim.story(2), [Accepted, Started]);
+    let at = back[4].1;
+    sim.offer(joining(&guard, 7, &line(at), id(2), 4));
+    for number in 3..=5 {
+        assert_eq!(sim.story(number), [Accepted, Superseded], "{number}");
+    }
+    // Two that would join: the later one wins, the running plan is the same.
+    sim.offer(joining(&guard, 8, &line(at), id(2), 4));
+    assert_eq!(sim.story(7), [Accepted, Superseded]);
+    sim.run_until(Mode::Hold, 2000);
+    assert_eq!(sim.story(2), [Accepted, Started, Superseded]);
+    assert_eq!(sim.story(8), [Accepted, Started, Finished]);
+}
+
+#[test]
+fn pause_speed_and_resume_are_ramps_on_the_path() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let points = line(HOME);
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &points));
+    sim.run(50);
+    sim.top_acceleration = 0.0;
+    assert_eq!(sim.order(Order::Speed(0.5)).verdict, Verdict::Accepted);
+    sim.run(60);
+    assert!((sim.last_v[0] - 0.5).abs() < 1e-9, "{}", sim.last_v[0]);
+    assert_eq!(sim.order(Order::Pause).verdict, Verdict::Accepted);
+    assert_eq!(sim.mode(), Mode::Executing, "it still slows down");
+    sim.run_until(Mode::Paused, 100);
+    let held = sim.last;
+    sim.run(500);
+    assert_eq!(sim.last, held);
+    assert_eq!(sim.order(Order::Resume).verdict, Verdict::Accepted);
+    assert_eq!(sim.mode(), Mode::Executing);
+    sim.order(Order::Speed(1.0));
+    sim.run(110);
+    assert!((sim.last_v[0] - 1.0).abs() < 1e-9);
+    assert!(sim.top_acceleration <= 10.0 + 1e-6, "{}", sim.top_acceleration);
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(sim.last, Some(points[8].1));
+    for bad in [-0.1, 1.1, f64::NAN, f64::INFINITY] {
+        assert_eq!(sim.order(Order::Speed(bad)).verdict, Verdict::BadValue);
+    }
+}
+
+#[test]
+fn a_plan_that_replaces_a_paused_one_waits_for_the_resume() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(HOME)));
+    sim.run(100);
+    sim.order(Order::Pause);
+    sim.run_until(Mode::Paused, 200);
+    let held = sim.last.unwrap();
+    sim.offer(plan(&guard, 2, JoinRule::StopThenStart, &line(held)));
+    sim.run(200);
+    assert_eq!(sim.mode(), Mode::Paused);
+    assert_eq!(sim.story(1), [Accepted, Started, Superseded]);
+    assert_eq!(sim.last, Some(held));
+    sim.order(Order::Resume);
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(sim.story(2), [Accepted, Started, Finished]);
+}
+
+#[test]
+fn stop_drops_every_plan_and_disable_comes_at_stand_still() {
+    for disable in [false, true] {
+        let mut sim = Sim::holding(pr2());
+        let guard = sim.guard;
+        let points = line(HOME);
+        sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &points));
+        let back: Vec<_> = (0..9).map(|i| (points[i].0, points[8 - i].1)).collect();
+        sim.offer(plan(&guard, 2, JoinRule::AfterCurrent, &back));
+        sim.run(100);
+        sim.top_acceleration = 0.0;
+        let order = if disable { Order::StopAndDisable } else { Order::Stop };
+        assert_eq!(sim.order(order).verdict, Verdict::Accepted);
+        assert_eq!(sim.mode(), Mode::Stopping);
+        assert_eq!(sim.story(2), [Accepted, Aborted]);
+        only(&sim.offer(plan(&guard, 3, JoinRule::StopThenStart, &line(HOME))), Rejected);
+        while sim.mode() == Mode::Stopping {
+            let out = sim.tick(None, None);
+            assert!(!out.setpoint.unwrap().disable || sim.mode() == Mode::Hold);
+        }
+        assert!(sim.top_acceleration <= 10.0 + 1e-6, "{}", sim.top_acceleration);
+        assert_eq!(sim.story(1), [Accepted, Started, Aborted]);
+        assert_eq!(sim.events.last().unwrap().why.reason, Reason::Stopped);
+        assert_eq!(sim.tick(None, None).setpoint.unwrap().disable, disable);
+        let held = sim.last.unwrap();
+        let next = plan(&guard, 4, JoinRule::StopThenStart, &line(held));
+        if disable {
+            assert_eq!(only(&sim.offer(next), Rejected).why.reason, Reason::NotReady);
+            assert_eq!(sim.order(Order::Resume).verdict, Verdict::Accepted);
+            sim.run(3);
+            assert_eq!(sim.mode(), Mode::Hold);
+            assert!(!sim.tick(None, None).setpoint.unwrap().disable);
+        } else {
+            only(&sim.offer(next), Accepted);
+        }
+    }
+}
+
+#[test]
+fn shutdown_stops_tells_and_stays_down() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(HOME)));
+    sim.run(100);
+    sim.order(Order::Shutdown);
+    assert!(!sim.state.is_down());
+    sim.run(110);
+    assert!(sim.state.is_down());
+    assert_eq!(sim.events.last().unwrap().why.reason, Reason::Shutdown);
+    assert_eq!(sim.order(Order::Resume).verdict, Verdict::WrongMode);
+    assert!(sim.tick(None, None).setpoint.unwrap().disable);
+}
+
+/// Every order in every mode: the answer, and the mode some cycles later.
+#[test]
+fn orders_in_every_mode() {
+    use Verdict::{Accepted as Yes, StillFaulty, WrongMode as No};
+    let orders = [
+        Order::Status,
+        Order::Pause,
+        Order::Resume,
+        Order::Stop,
+        Order::StopAndDisable,
+        Order::Speed(0.3),
+        Order::Reset,
+        Order::Shutdown,
+    ];
+    let table = [
+        (Mode::Init, [Yes, No, No, Yes, Yes, Yes, Yes, Yes]),
+        (Mode::Hold, [Yes, No, No, Yes, Yes, Yes, Yes, Yes]),
+        (Mode::Executing, [Yes, Yes, Yes, Yes, Yes, Yes, No, Yes]),
+        (Mode::Paused, [Yes, Yes, Yes, Yes, Yes, Yes, No, Yes]),
+        (Mode::Stopping, [Yes, No, No, Yes, Yes, Yes, No, Yes]),
+        (Mode::Fault, [Yes, No, No, Yes, Yes, Yes, StillFaulty, Yes]),
+    ];
+    for (mode, verdicts) in table {
+        for (order, verdict) in orders.into_iter().zip(verdicts) {
+            let mut sim = in_mode(mode);
+            assert_eq!(sim.order(order).verdict, verdict, "{order:?} in {mode}");
+            sim.run(1200);
+            let life = sim.lives.get(&id(1)).copied().unwrap_or_default();
+            let open = matches!(order, Order::Pause)
+                || (mode == Mode::Paused
+                    && !matches!(order, Order::Resume)
+                    && verdict == Yes
+                    && matches!(order, Order::Status | Order::Speed(_)))
+                || (mode == Mode::Paused && matches!(order, Order::Reset));
+            if !open {
+                assert_eq!(life.ended, life.accepted, "{order:?} in {mode}");
+            }
+        }
+    }
+}
+
+/// Every plan in every mode: accepted or rejected, never both, and the arm never jumps (`Sim`
+/// judges that).
+#[test]
+fn offers_in_every_mode() {
+    for mode in Mode::ALL {
+        for rule in JoinRule::ALL {
+            let mut sim = in_mode(*mode);
+            let guard = sim.guard;
+            let from = sim.last.unwrap_or(HOME);
+            let offer = match rule {
+                JoinRule::AtKnot => joining(&guard, 9, &line(from), id(1), 8),
+                rule => plan(&guard, 9, *rule, &line(from)),
+            };
+            let events = sim.offer(offer);
+            let mine: Vec<_> = events.iter().filter(|e| e.plan == id(9)).collect();
+            let ready = matches!(mode, Mode::Hold | Mode::Paused);
+            let fits = match rule {
+                JoinRule::StopThenStart => ready,
+                JoinRule::AfterCurrent => *mode == Mode::Hold,
+                JoinRule::AtKnot => false,
+            };
+            assert_eq!(mine[0].kind == Accepted, fits, "{rule} in {mode}: {mine:?}");
+            sim.order(Order::Stop);
+            sim.run(500);
+            for (plan, life) in &sim.lives {
+                assert_eq!(life.ended, life.accepted, "{plan} after {rule} in {mode}");
+            }
+        }
+    }
+}
+
+fn in_mode(mode: Mode) -> Sim {
+    let guard = pr2();
+    if mode == Mode::Init {
+        let mut sim = Sim::new(guard);
+        sim.status = 0;
+        sim.run(5);
+        assert_eq!(sim.mode(), mode);
+        return sim;
+    }
+    let mut sim = Sim::holding(guard);
+    if mode != Mode::Hold {
+        sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(HOME)));
+        sim.run(100);
+    }
+    match mode {
+        Mode::Paused => {
+            sim.order(Order::Pause);
+            sim.run_until(Mode::Paused, 200);
+        }
+        Mode::Stopping => {
+            sim.order(Order::Stop);
+        }
+        Mode::Fault => {
+            sim.status |= status::ERROR;
+            sim.run(2);
+        }
+        Mode::Init | Mode::Hold | Mode::Executing => {}
+    }
+    assert_eq!(sim.mode(), mode);
+    sim
+}
+
+/// A fault's name, what makes it, what it is called, and whether the arm brakes on its path.
+type Trouble = (&'static str, fn(&mut Sim) -> Option<Measured>, Fault, bool);
+
+const TROUBLES: &[Trouble] = &[
+    ("silence", |_| None, Fault::CommunicationLost, true),
+    (
+        "frozen",
+        |s| Some(Measured { stamp_ns: 1100 * MS, ..s.measured() }),
+        Fault::CommunicationLost,
+        true,
+    ),
+    (
+        "halt",
+        |s| Some(Measured { status: s.status | status::HALTED, ..s.measured() }),
+        Fault::Halted,
+        false,
+    ),
+    ("uncalibrated", |s| Some(Measured { status: 0, ..s.measured() }), Fault::NotCalibrated, false),
+    (
+        "endpoint error",
+        |s| Some(Measured { status: s.status | status::ERROR, ..s.measured() }),
+        Fault::Endpoint,
+        false,
+    ),
+    (
+        "endpoint hears nothing",
+        |s| Some(Measured { status: s.status | status::SETPOINT_TIMEOUT, ..s.measured() }),
+        Fault::Endpoint,
+        false,
+    ),
+    (
+        "nan",
+        |s| Some(Measured { q: moved(s.arm, 3, f64::NAN), ..s.measured() }),
+        Fault::NotFinite,
+        true,
+    ),
+    (
+        "infinite",
+        |s| Some(Measured { q: moved(s.arm, 0, f64::INFINITY), ..s.measured() }),
+        Fault::NotFinite,
+        true,
+    ),
+    ("joint count", |s| Some(Measured { joint_count: 6, ..s.measured() }), Fault::JointCount, true),
+    (
+        "stuck",
+        |s| Some(Measured { q: moved(s.arm, 2, 0.2), ..s.measured() }),
+        Fault::FollowingError,
+        true,
+    ),
+];
+
+/// The fault matrix: every trouble in every mode. The right fault is latched, every plan ends
+/// once, the commanded position never jumps, and once the trouble is gone a reset leads to Hold.
+#[test]
+fn fault_matrix() {
+    for (name, trouble, fault, brakes) in TROUBLES {
+        for mode in [Mode::Init, Mode::Hold, Mode::Executing, Mode::Paused, Mode::Stopping] {
+            let mut sim = in_mode(mode);
+            let moving = sim.last_v[0] != 0.0;
+            let at_once = sim.last;
+            sim.top_acceleration = 0.0;
+            for _ in 0..250 {
+                let measured = trouble(&mut sim);
+                sim.tick_with(measured, None, None);
+            }
+            if mode == Mode::Init {
+                assert_eq!(sim.mode(), Mode::Init, "{name}");
+                sim.status = status::CALIBRATED;
+            } else {
+                assert_eq!(sim.mode(), Mode::Fault, "{name} in {mode}");
+                assert_eq!(sim.state.snapshot().fault, *fault, "{name} in {mode}");
+                assert_eq!(sim.order(Order::Pause).verdict, Verdict::WrongMode);
+                if moving && *brakes {
+                    assert!(sim.last != at_once, "{name} in {mode}: it brakes on its path");
+                    assert!(
+                        sim.top_acceleration <= 10.0 + 1e-6,
+                        "{name}: {}",
+                        sim.top_acceleration
+                    );
+                }
+            }
+            for (plan, life) in &sim.lives {
+                assert_eq!(life.ended, life.accepted, "{plan} after {name} in {mode}");
+            }
+            // The trouble is gone: nothing moves by itself, and a reset leads back.
+            sim.run(50);
+            let held = sim.last;
+            if mode != Mode::Init {
+                assert_eq!(sim.mode(), Mode::Fault, "{name}: it is latched");
+                let offer = plan(&sim.guard, 8, JoinRule::StopThenStart, &line(HOME));
+                assert_eq!(only(&sim.offer(offer), Rejected).why.reason, Reason::NotReady);
+                assert_eq!(sim.order(Order::Reset).verdict, Verdict::Accepted, "{name} in {mode}");
+            }
+            sim.run(200);
+            assert_eq!(sim.mode(), Mode::Hold, "{name} in {mode}");
+            let still = sim.last.unwrap();
+            let held = held.unwrap();
+            assert!((0..7).all(|j| (still[j] - held[j]).abs() < 0.02), "{name} in {mode}");
+        }
+    }
+}
+
+#[test]
+fn a_stale_state_stops_on_the_path_and_does_not_restart() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(HOME)));
+    sim.run(100);
+    sim.speaks = false;
+    sim.run(19);
+    assert_eq!(sim.mode(), Mode::Executing);
+    sim.top_acceleration = 0.0;
+    sim.run(2);
+    assert_eq!(sim.mode(), Mode::Stopping);
+    sim.speaks = true;
+    sim.run(150);
+    assert!(sim.top_acceleration <= 10.0 + 1e-6);
+    assert_eq!((sim.mode(), sim.state.snapshot().fault), (Mode::Hold, Fault::StaleState));
+    assert_eq!(sim.story(1), [Accepted, Started, Aborted]);
+    let held = sim.last.unwrap();
+    only(&sim.offer(plan(&guard, 2, JoinRule::StopThenStart, &line(held))), Accepted);
+    assert_eq!(sim.state.snapshot().fault, Fault::None);
+}
+
+#[test]
+fn a_halt_is_over_with_a_resume() {
+    let mut sim = in_mode(Mode::Executing);
+    sim.status |= status::HALTED;
+    sim.run(5);
+    // The arm sags while its motors are off, and the commanded position goes with it.
+    for _ in 0..100 {
+        sim.arm[1] += 0.001;
+        let measured = sim.measured();
+        sim.tick_with(Some(measured), None, None);
+        let sagged = sim.measured().q;
+        sim.arm = sagged;
+    }
+    assert_eq!(sim.order(Order::Resume).verdict, Verdict::StillFaulty);
+    sim.status = status::CALIBRATED;
+    sim.run(5);
+    assert_eq!(sim.mode(), Mode::Fault);
+    assert_eq!(sim.order(Order::Resume).verdict, Verdict::Accepted);
+    sim.run(5);
+    assert_eq!(sim.mode(), Mode::Hold);
+}
+
+#[test]
+fn a_low_rate_is_a_fault() {
+    for (slow, fails) in [(1.2, false), (1.5, true)] {
+        let mut sim = in_mode(Mode::Hold);
+        for _ in 0..1000 {
+            sim.now += ((slow - 1.0) * 1e6) as u64;
+            sim.run(1);
+        }
+        let failed = sim.mode() == Mode::Fault;
+        assert_eq!(failed, fails, "{slow} ms a cycle");
+        assert!(!failed || sim.state.snapshot().fault == Fault::LowRate);
+    }
+}
+
+#[test]
+fn a_lag_that_the_endpoint_reports_is_no_following_error() {
+    // The virtual arm lags by two cycles; at 2 rad/s that is far less than the bound, so judge
+    // the arithmetic: with no allowance at all only the reported delay explains the distance.
+    let mut guard = pr2();
+    guard.following_error = 1e-6;
+    guard.following_lag = 0.0;
+    let mut sim = Sim::holding(guard);
+    let fast: Vec<_> =
+        (0..=4u32).map(|i| (u64::from(i) * 50 * MS, moved(HOME, 0, 0.1 * f64::from(i)))).collect();
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &fast));
+    sim.run_until(Mode::Hold, 400);
+    assert_eq!(sim.story(1), [Accepted, Started, Finished]);
+}

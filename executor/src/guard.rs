@@ -1,0 +1,173 @@
+//! The limits that the executor enforces: from its own URDF and its own parameters, never from
+//! the plan that it guards.
+
+use core::f64::consts::TAU;
+
+use crate::MAX_DOF;
+
+/// One value for each joint of the arm, chain order, unused entries 0. \[rad\] or \[m\]
+pub type Joints = [f64; MAX_DOF];
+
+/// What one joint may do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointGuard {
+    /// Soft limits at stand-still, ±∞ for a continuous joint. \[rad\] or \[m\]
+    pub lower: f64,
+    /// See `lower`.
+    pub upper: f64,
+    /// How far both soft limits move in for each unit of speed: 1 / k_position. \[s\]
+    pub margin: f64,
+    /// Velocity limit. \[rad/s\] or \[m/s\]
+    pub velocity: f64,
+    /// Whether whole turns make no difference.
+    pub continuous: bool,
+}
+
+impl JointGuard {
+    /// The soft limits at a speed: moved in by the way that the PR2's position gain needs to
+    /// brake from it.
+    #[must_use]
+    pub fn limits_at(&self, speed: f64) -> (f64, f64) {
+        let margin = self.margin * speed.abs();
+        (self.lower + margin, self.upper - margin)
+    }
+
+    /// `to - from`, by the shorter way around where the joint is continuous.
+    #[must_use]
+    pub fn difference(&self, from: f64, to: f64) -> f64 {
+        to - from + self.turns(from, to)
+    }
+
+    /// The whole turns to add to `value` so that it comes nearest to `reference`: 0 unless the
+    /// joint is continuous. \[rad\]
+    #[must_use]
+    pub fn turns(&self, reference: f64, value: f64) -> f64 {
+        if self.continuous { TAU * ((reference - value) / TAU).round() } else { 0.0 }
+    }
+}
+
+/// All of the executor's own bounds. Made once at start, read by every part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guard {
+    /// Used entries of `joints`.
+    pub dof: usize,
+    /// Each joint's limits.
+    pub joints: [JointGuard; MAX_DOF],
+    /// Cycle time. \[ns\]
+    pub period_ns: u64,
+    /// Each joint's bound on the acceleration of a stop, pause, resume or change of speed along
+    /// the path, on top of the plan's own. \[rad/s²\]
+    pub stop_acceleration: f64,
+    /// Acceleration of the motion from where the arm holds to a plan's first knot. \[rad/s²\]
+    pub connector_acceleration: f64,
+    /// How far a plan's first knot may be from where the arm holds. \[rad\]
+    pub start_tolerance: f64,
+    /// How far a plan's first knot may be from the knot that it joins. \[rad\]
+    pub join_tolerance: f64,
+    /// Age of the joint state at which the arm stops on its path. \[ns\]
+    pub stale_ns: u64,
+    /// Age of the joint state at which communication counts as lost. \[ns\]
+    pub lost_ns: u64,
+    /// Following error that is allowed at stand-still. \[rad\]
+    pub following_error: f64,
+    /// Following error that is allowed for each unit of commanded speed. \[s\]
+    pub following_lag: f64,
+    /// States in a row with too large a following error (or an endpoint that says that it got no
+    /// setpoints) that make a fault.
+    pub debounce: u32,
+    /// Mean rate over 600 ms below which the arm is stopped. \[Hz\]
+    pub min_rate: f64,
+}
+
+impl Guard {
+    /// Guards these joints with the default parameters at a 1 kHz cycle. At most
+    /// [`MAX_DOF`] joints are used.
+    #[must_use]
+    pub fn new(joints: &[JointGuard]) -> Self {
+        let free =
+            JointGuard { lower: 0.0, upper: 0.0, margin: 0.0, velocity: 0.0, continuous: false };
+        let dof = joints.len().min(MAX_DOF);
+        let mut all = [free; MAX_DOF];
+        all[..dof].copy_from_slice(&joints[..dof]);
+        Self {
+            dof,
+            joints: all,
+            period_ns: 1_000_000,
+            stop_acceleration: 10.0,
+            connector_acceleration: 2.0,
+            start_tolerance: 0.02,
+            join_tolerance: 1e-9,
+            stale_ns: 20_000_000,
+            lost_ns: 100_000_000,
+            following_error: 0.1,
+            following_lag: 0.15,
+            debounce: 20,
+            min_rate: 750.0,
+        }
+    }
+
+    /// Cycle time. \[s\]
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        self.period_ns as f64 * 1e-9
+    }
+
+    /// The used joints.
+    #[must_use]
+    pub fn used(&self) -> &[JointGuard] {
+        &self.joints[..self.dof.min(MAX_DOF)]
+    }
+
+    /// The joint that is further than `tolerance` from `from`, the farthest one, and by how much.
+    #[must_use]
+    pub fn farthest(&self, from: &Joints, to: &Joints, tolerance: f64) -> Option<(usize, f64)> {
+        let mut worst: Option<(usize, f64)> = None;
+        for (j, guard) in self.used().iter().enumerate() {
+            let apart = guard.difference(from[j], to[j]).abs();
+            if apart.is_nan() {
+                return Some((j, apart));
+            }
+            if apart > worst.map_or(tolerance, |(_, d)| d) {
+                worst = Some((j, apart));
+            }
+        }
+        worst
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// The PR2's right arm, as facts of the PR2 give it.
+    pub(crate) fn pr2() -> Guard {
+        let j = |lower, upper, k: f64, velocity, continuous| JointGuard {
+            lower,
+            upper,
+            margin: 1.0 / k,
+            velocity,
+            continuous,
+        };
+        let inf = f64::INFINITY;
+        Guard::new(&[
+            j(-2.1353981634, 0.564601836603, 100.0, 2.088, false),
+            j(-0.3536, 1.2963, 100.0, 2.082, false),
+            j(-3.75, 0.65, 100.0, 3.27, false),
+            j(-2.1213, -0.15, 100.0, 3.3, false),
+            j(-inf, inf, f64::INFINITY, 3.6, true),
+            j(-2.0, -0.1, 20.0, 3.078, false),
+            j(-inf, inf, f64::INFINITY, 3.6, true),
+        ])
+    }
+
+    #[test]
+    fn differences_take_the_short_way_on_continuous_joints_only() {
+        let guard = pr2();
+        assert!((guard.joints[4].difference(3.0, -3.0) - 0.283_185_307).abs() < 1e-8);
+        assert!((guard.joints[4].difference(-9.0, -9.0 + 10.0 * TAU)).abs() < 1e-12);
+        assert_eq!(guard.joints[0].difference(3.0, -3.0), -6.0);
+        let mut to = [0.0; MAX_DOF];
+        to[5] = f64::NAN;
+        assert_eq!(guard.farthest(&[0.0; MAX_DOF], &to, 0.1).map(|(j, _)| j), Some(5));
+    }
+}

@@ -1,0 +1,267 @@
+//! A plan in motion: a short connector from where the arm holds, then the plan, walked along one
+//! path time whose rate is ramped for pause, stop and speed.
+
+use std::sync::Arc;
+
+use crate::MAX_DOF;
+
+use crate::Joints;
+use crate::admit::ValidPlan;
+use crate::guard::Guard;
+use crate::interpolate::{PlanKnot, Sample, sample};
+
+/// Knots passed one by one before the next one is searched for.
+const WALK: usize = 32;
+/// Cycles after which a predicted stop is given up: the slowest ramp takes 1,000 at 1 kHz.
+const PREDICTION_CYCLES: usize = 20_000;
+
+/// How far along its path a motion is and how fast it goes along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Path time: negative on the connector, then the plan's own time. \[ns\]
+    pub time: f64,
+    /// Path time a unit of time, 0…1.
+    pub rate: f64,
+    segment: usize,
+}
+
+/// A plan that the arm is on.
+#[derive(Clone, Debug)]
+pub struct Path {
+    plan: Arc<ValidPlan>,
+    /// Whole turns added to the plan's continuous joints. \[rad\]
+    shift: Joints,
+    connector: Connector,
+    progress: Progress,
+}
+
+impl Path {
+    /// The plan from its first knot, reached by a connector from `from`, where the arm holds.
+    #[must_use]
+    pub fn start(plan: Arc<ValidPlan>, from: &Joints, rate: f64, guard: &Guard) -> Self {
+        let shift = shift(&plan, from, guard);
+        let first = plan.knots().first().map_or(*from, |k| shifted(&k.q, &shift));
+        let connector = Connector::new(from, &first, guard);
+        let progress = Progress { time: -connector.duration, rate, segment: 0 };
+        Self { plan, shift, connector, progress }
+    }
+
+    /// The plan entered at its first knot at full motion, `time` past it. `at` is the first
+    /// knot's place as the plan before it has it. \[ns\]
+    #[must_use]
+    pub fn join(plan: Arc<ValidPlan>, at: &Joints, time: f64, rate: f64, guard: &Guard) -> Self {
+        let shift = shift(&plan, at, guard);
+        let progress = Progress { time: 0.0, rate, segment: 0 };
+        let mut path = Self { plan, shift, connector: Connector::none(at), progress };
+        path.seek(time);
+        path
+    }
+
+    /// The plan.
+    #[must_use]
+    pub fn plan(&self) -> &Arc<ValidPlan> {
+        &self.plan
+    }
+
+    /// Gives the plan back.
+    #[must_use]
+    pub fn into_plan(self) -> Arc<ValidPlan> {
+        self.plan
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    /// The knot whose segment it is on.
+    #[must_use]
+    pub fn knot(&self) -> usize {
+        self.progress.segment
+    }
+
+    /// Whether the last knot is reached.
+    #[must_use]
+    pub fn ended(&self) -> bool {
+        self.progress.time >= self.plan.duration()
+    }
+
+    /// Goes on for one cycle, the rate on its way to `target`.
+    pub fn advance(&mut self, target: f64, guard: &Guard) {
+        self.progress = self.next(self.progress, target, guard);
+    }
+
+    /// The commanded positions and velocities where it is.
+    #[must_use]
+    pub fn sample(&self) -> Sample {
+        self.sample_at(self.progress)
+    }
+
+    /// Where a stop that begins with the next cycle ends; `None` where no end is in sight. The
+    /// same arithmetic as [`Self::advance`], so the arm stops there to the bit.
+    #[must_use]
+    pub fn predict_stop(&self, guard: &Guard) -> Option<Joints> {
+        let mut progress = self.progress;
+        for _ in 0..PREDICTION_CYCLES {
+            if progress.rate <= 0.0 || progress.time >= self.plan.duration() {
+                return Some(self.sample_at(progress).q);
+            }
+            progress = self.next(progress, 0.0, guard);
+        }
+        None
+    }
+
+    /// A knot's place and time in this path; `None` where the plan has no such knot or the path
+    /// is past it.
+    #[must_use]
+    pub fn upcoming(&self, knot: usize) -> Option<PlanKnot> {
+        self.knot_at(knot).filter(|k| k.time > self.progress.time)
+    }
+
+    /// A knot's place and time in this path; `None` where the plan has no such knot.
+    #[must_use]
+    pub fn knot_at(&self, knot: usize) -> Option<PlanKnot> {
+        let mut knot = *self.plan.knots().get(knot)?;
+        knot.q = shifted(&knot.q, &self.shift);
+        Some(knot)
+    }
+
+    /// The last knot's place in this path.
+    #[must_use]
+    pub fn end(&self) -> Joints {
+        self.plan.knots().last().map_or(self.connector.to, |k| shifted(&k.q, &self.shift))
+    }
+
+    fn next(&self, from: Progress, target: f64, guard: &Guard) -> Progress {
+        let ramp = if from.time < 0.0 {
+            self.connector.ramp
+        } else {
+            self.plan.knots().get(from.segment).map_or(1.0, |k| k.ramp)
+        };
+        let step = ramp * guard.period();
+        let rate = from.rate + (target - from.rate).clamp(-step, step);
+        let time = from.time + 0.5 * (from.rate + rate) * guard.period_ns as f64;
+        Progress { time, rate, segment: self.segment(from.segment, time) }
+    }
+
+    fn seek(&mut self, time: f64) {
+        self.progress.time = time;
+        self.progress.segment = self.segment(0, time);
+    }
+
+    /// The segment of a path time, sought from an earlier segment on.
+    fn segment(&self, from: usize, time: f64) -> usize {
+        let knots = self.plan.knots();
+        let last = knots.len().saturating_sub(2);
+        let from = from.min(last);
+        for segment in from..from + WALK {
+            if segment >= last || time < knots[segment + 1].time {
+                return segment;
+            }
+        }
+        knots.partition_point(|k| k.time <= time).saturating_sub(1).min(last)
+    }
+
+    fn sample_at(&self, at: Progress) -> Sample {
+        if at.time < 0.0 {
+            return self.connector.sample(at.time + self.connector.duration, at.rate);
+        }
+        let knots = self.plan.knots();
+        let (Some(a), Some(b)) = (knots.get(at.segment), knots.get(at.segment + 1)) else {
+            return Sample { q: self.connector.to, v: [0.0; MAX_DOF] };
+        };
+        let mut s = sample(a, b, self.plan.interpolation(), at.time);
+        s.q = shifted(&s.q, &self.shift);
+        s.v = s.v.map(|v| v * at.rate);
+        s
+    }
+}
+
+/// A straight rest-to-rest motion: one trapezoid of speed shared by all joints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Connector {
+    from: Joints,
+    to: Joints,
+    /// \[ns\]
+    duration: f64,
+    /// Time of speeding up, and of slowing down. \[s\]
+    rise: f64,
+    /// Acceleration of the share 0…1 of the way. \[1/s²\]
+    acceleration: f64,
+    /// See [`PlanKnot::ramp`].
+    ramp: f64,
+}
+
+impl Connector {
+    fn none(at: &Joints) -> Self {
+        Self { from: *at, to: *at, duration: 0.0, rise: 0.0, acceleration: 0.0, ramp: 50.0 }
+    }
+
+    fn new(from: &Joints, to: &Joints, guard: &Guard) -> Self {
+        let mut way = 0.0f64;
+        let mut share_speed = f64::INFINITY;
+        for (j, bound) in guard.used().iter().enumerate() {
+            let d = (to[j] - from[j]).abs();
+            way = way.max(d);
+            if d > 0.0 {
+                share_speed = share_speed.min(bound.velocity / d);
+            }
+        }
+        if !(way > 0.0) || !(share_speed > 0.0) {
+            return Self { from: *from, ..Self::none(to) };
+        }
+        let acceleration = guard.connector_acceleration / way;
+        let rise = (share_speed / acceleration).min(acceleration.sqrt().recip());
+        let top = acceleration * rise;
+        // The way is 1: a triangle covers top · rise, the rest is at top speed.
+        let cruise = (1.0 - top * rise).max(0.0) / top;
+        Self {
+            from: *from,
+            to: *to,
+            duration: ((2.0 * rise + cruise) * 1e9).ceil(),
+            rise,
+            acceleration,
+            ramp: (guard.stop_acceleration / (top * way)).clamp(1.0, 50.0),
+        }
+    }
+
+    fn sample(&self, elapsed: f64, rate: f64) -> Sample {
+        let total = self.duration * 1e-9;
+        let t = (elapsed * 1e-9).clamp(0.0, total);
+        let (a, rise) = (self.acceleration, self.rise);
+        let (share, speed) = if t <= rise {
+            (0.5 * a * t * t, a * t)
+        } else if t < total - rise {
+            (0.5 * a * rise * rise + a * rise * (t - rise), a * rise)
+        } else {
+            let left = total - t;
+            (1.0 - 0.5 * a * left * left, a * left)
+        };
+        let mut s = Sample { q: self.to, v: [0.0; MAX_DOF] };
+        for j in 0..MAX_DOF {
+            let d = self.to[j] - self.from[j];
+            s.q[j] = self.from[j] + d * share.clamp(0.0, 1.0);
+            s.v[j] = d * speed * rate;
+        }
+        s
+    }
+}
+
+fn shift(plan: &ValidPlan, reference: &Joints, guard: &Guard) -> Joints {
+    let mut shift = [0.0; MAX_DOF];
+    if let Some(first) = plan.knots().first() {
+        for (j, bound) in guard.used().iter().enumerate() {
+            shift[j] = bound.turns(reference[j], first.q[j]);
+        }
+    }
+    shift
+}
+
+fn shifted(q: &Joints, shift: &Joints) -> Joints {
+    let mut sum = *q;
+    for j in 0..MAX_DOF {
+        sum[j] += shift[j];
+    }
+    sum
+}
