@@ -1,6 +1,7 @@
 //! The serial chain of an arm, folded for speed: one fixed transform and one axis a joint.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+use wide::f64x4;
 
 use crate::{Jacobian, JointVector, MAX_DOF};
 
@@ -47,9 +48,10 @@ impl Chain {
     pub(crate) fn tip_pose(&self, q: &JointVector) -> Isometry3<f64> {
         let mut rotation = UnitQuaternion::identity();
         let mut position = Vector3::zeros();
-        for (step, &value) in self.steps.iter().zip(q) {
+        let halves = half_sines(q);
+        for (i, step) in self.steps.iter().enumerate() {
             enter(step, &mut rotation, &mut position);
-            move_along(step, value, &mut rotation, &mut position);
+            move_along(step, q[i], halves.of(i), &mut rotation, &mut position);
         }
         position += rotation * self.tip.translation.vector;
         Isometry3::from_parts(position.into(), rotation * self.tip.rotation)
@@ -61,10 +63,11 @@ impl Chain {
         let mut axes = [JointAxis::default(); MAX_DOF];
         let mut rotation = UnitQuaternion::identity();
         let mut position = Vector3::zeros();
-        for ((step, &value), axis) in self.steps.iter().zip(q).zip(&mut axes) {
+        let halves = half_sines(q);
+        for (i, step) in self.steps.iter().enumerate() {
             enter(step, &mut rotation, &mut position);
-            *axis = JointAxis { direction: rotation * step.axis, point: position };
-            move_along(step, value, &mut rotation, &mut position);
+            axes[i] = JointAxis { direction: rotation * step.axis, point: position };
+            move_along(step, q[i], halves.of(i), &mut rotation, &mut position);
         }
         position += rotation * self.tip.translation.vector;
         (Isometry3::from_parts(position.into(), rotation * self.tip.rotation), axes)
@@ -111,17 +114,44 @@ fn enter(step: &Step, rotation: &mut UnitQuaternion<f64>, position: &mut Vector3
 fn move_along(
     step: &Step,
     value: f64,
+    (sin, cos): (f64, f64),
     rotation: &mut UnitQuaternion<f64>,
     position: &mut Vector3<f64>,
 ) {
     if step.prismatic {
         *position += *rotation * (step.axis * value);
     } else {
-        *rotation *= about(&step.axis, value);
+        let turn = Quaternion::from_parts(cos, step.axis * sin);
+        *rotation *= UnitQuaternion::new_unchecked(turn);
     }
 }
 
-/// Rotation about a unit axis. [rad]
+/// Sines and cosines of half of each joint value.
+struct HalfSines {
+    sin: JointVector,
+    cos: JointVector,
+}
+
+impl HalfSines {
+    #[inline]
+    fn of(&self, joint: usize) -> (f64, f64) {
+        (self.sin[joint], self.cos[joint])
+    }
+}
+
+#[inline]
+fn half_sines(q: &JointVector) -> HalfSines {
+    let [a, b, c, d, e, f, g, h] = *q;
+    let (s0, c0) = (f64x4::new([a, b, c, d]) * 0.5).sin_cos();
+    let (s1, c1) = (f64x4::new([e, f, g, h]) * 0.5).sin_cos();
+    let join = |one: f64x4, two: f64x4| {
+        let ([a, b, c, d], [e, f, g, h]) = (one.to_array(), two.to_array());
+        [a, b, c, d, e, f, g, h]
+    };
+    HalfSines { sin: join(s0, s1), cos: join(c0, c1) }
+}
+
+/// Rotation about a unit axis. \[rad\]
 #[inline]
 pub(crate) fn about(axis: &Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
     let (sin, cos) = (0.5 * angle).sin_cos();

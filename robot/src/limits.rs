@@ -1,5 +1,7 @@
 //! Joint limits of an arm, and the braking margin at soft limits.
 
+use std::f64::consts::{PI, TAU};
+
 use crate::urdf::{Joint, JointKind};
 
 /// Limits of one active joint. [rad, rad/s, rad/s²; m for prismatic joints]
@@ -24,7 +26,7 @@ pub struct JointLimits {
 
 impl JointLimits {
     /// Where the URDF has no acceleration, a joint reaches its largest speed in this time:
-    /// acceleration = velocity / 0.5 s. [s]
+    /// acceleration = velocity / 0.5 s. \[s\]
     pub const DEFAULT_ACCELERATION_TIME: f64 = 0.5;
 
     /// The limits of a joint, or `None` without a usable `<limit>`.
@@ -78,21 +80,23 @@ impl JointLimits {
     }
 }
 
-/// The representative of an angle nearest to `near`, by whole turns. [rad]
+/// The representative of an angle nearest to `near`, by whole turns. \[rad\]
 #[inline]
 pub(crate) fn unwrap_near(angle: f64, near: f64) -> f64 {
-    let turns = ((near - angle) * std::f64::consts::TAU.recip()).round_ties_even();
-    angle + turns * std::f64::consts::TAU
+    let ahead = near - angle;
+    // Nearly always true, and rounding is a call where the processor has no instruction for it.
+    if ahead.abs() <= PI {
+        return angle;
+    }
+    angle + (ahead / TAU).round_ties_even() * TAU
 }
 
-/// The representative of an angle in (−π, π]. [rad]
+/// The representative of an angle in (−π, π]. \[rad\]
 #[inline]
 pub(crate) fn wrap(angle: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
-    if angle > PI || angle <= -PI {
-        let wrapped = angle - TAU * ((angle - PI) / TAU).ceil();
-        if wrapped <= -PI { wrapped + TAU } else { wrapped }
-    } else {
-        angle
+    if angle > -PI && angle <= PI {
+        return angle;
     }
+    let wrapped = unwrap_near(angle, 0.0);
+    if wrapped <= -PI { wrapped + TAU } else { wrapped }
 }

@@ -35,7 +35,7 @@ impl ArmSpec {
     }
 }
 
-/// A posture of the PR2's right arm; the left arm's mirrors pan, rolls and wrist roll. [rad]
+/// A posture of the PR2's right arm; the left arm's mirrors pan, rolls and wrist roll. \[rad\]
 struct Posture([f64; 7]);
 
 /// Ready to work in front of the robot.
@@ -53,12 +53,12 @@ const JOINTS: [(&str, f64); 7] = [
     ("wrist_roll_joint", -1.0),
 ];
 
-/// The ready position of a joint of the PR2's arms, by name. [rad]
+/// The ready position of a joint of the PR2's arms, by name. \[rad\]
 pub(crate) fn ready(joint: &str) -> Option<f64> {
     READY.of(joint)
 }
 
-/// Where a joint of the PR2's arms is held by default while another arm works. [rad]
+/// Where a joint of the PR2's arms is held by default while another arm works. \[rad\]
 pub(crate) fn aside(joint: &str) -> Option<f64> {
     ASIDE.of(joint)
 }

@@ -48,7 +48,7 @@ pub struct CollisionShape {
     pub geometry: Geometry,
 }
 
-/// Geometry of a collision shape, centred on its origin. [m]
+/// Geometry of a collision shape, centred on its origin. \[m\]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// A cuboid.
@@ -114,11 +114,11 @@ pub struct Joint {
 pub enum JointKind {
     /// Not at all.
     Fixed,
-    /// About its axis between limits. [rad]
+    /// About its axis between limits. \[rad\]
     Revolute,
-    /// About its axis without limits. [rad]
+    /// About its axis without limits. \[rad\]
     Continuous,
-    /// Along its axis between limits. [m]
+    /// Along its axis between limits. \[m\]
     Prismatic,
 }
 

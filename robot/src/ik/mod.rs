@@ -1,6 +1,9 @@
 //! Inverse kinematics behind one trait.
 
+mod closed;
+mod lanes;
 mod numeric;
+mod pan;
 mod roll;
 mod shape;
 
@@ -11,14 +14,19 @@ use nalgebra::Isometry3;
 use crate::JointVector;
 use crate::chain::Chain;
 use crate::limits::JointLimits;
+use closed::ClosedForm;
 use numeric::Numeric;
+use pan::ShoulderPan;
 use roll::UpperArmRoll;
 use shape::Pr2Shape;
 
 /// Names one family of solutions that changes continuously with the target.
 ///
-/// Following one branch with [`InverseKinematics::solve_on`] never jumps to another posture: the
-/// branch ends (`None`) where it meets another one or leaves the reachable space.
+/// Following one branch with [`InverseKinematics::solve_on`] never changes over to another posture:
+/// the branch ends (`None`) where it leaves the reachable space. Where two branches meet (a fold)
+/// a joint path may go over from one to the other, while each branch turns back; and near a
+/// singularity joints move fast however little the target moves. So whoever follows a branch
+/// compares neighbouring solutions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Branch(pub u8);
 
@@ -29,7 +37,7 @@ pub struct Solution {
     pub q: JointVector,
     /// The family that the solution belongs to.
     pub branch: Branch,
-    /// Position of the redundant joint; 0 without redundancy. [rad]
+    /// Position of the redundant joint; 0 without redundancy. \[rad\]
     pub redundancy: f64,
 }
 
@@ -38,7 +46,7 @@ pub type Solutions = heapless::Vec<Solution, 32>;
 
 /// Finds joint positions for a pose of the tip.
 pub trait InverseKinematics: Send + Sync {
-    /// Range of the redundant joint inside the margined limits [rad]; ±π for a continuous one;
+    /// Range of the redundant joint inside the margined limits \[rad\]; ±π for a continuous one;
     /// `None` for an arm without redundancy.
     fn redundancy_range(&self) -> Option<(f64, f64)>;
 
@@ -64,35 +72,43 @@ pub trait InverseKinematics: Send + Sync {
 /// Which joint of a PR2-shaped arm is the redundancy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RedundantJoint {
-    /// The third joint, the default: eight solutions at most.
+    /// The third joint, the default: eight solutions at most, two inside the PR2's limits.
     UpperArmRoll,
+    /// The first joint: eight solutions at most, two inside the PR2's limits. Its branches end
+    /// elsewhere than those of the roll.
+    ShoulderPan,
 }
 
 /// The solvers that fit an arm.
 #[derive(Clone)]
 pub(crate) enum Solvers {
-    Pr2 { roll: Arc<UpperArmRoll> },
+    Pr2 { roll: Arc<ClosedForm<UpperArmRoll>>, pan: Arc<ClosedForm<ShoulderPan>> },
     Numeric(Arc<Numeric>),
 }
 
 impl Solvers {
     pub(crate) fn new(chain: &Chain, limits: &[JointLimits], margined: &[(f64, f64)]) -> Self {
-        match Pr2Shape::recognise(chain, limits) {
-            Some(shape) => Self::Pr2 { roll: Arc::new(UpperArmRoll::new(shape, margined[2])) },
-            None => Self::Numeric(Arc::new(Numeric::new(chain, limits, margined))),
+        let Some(shape) = Pr2Shape::recognise(chain, limits) else {
+            return Self::Numeric(Arc::new(Numeric::new(chain, limits, margined)));
+        };
+        let (roll, pan) = (UpperArmRoll::new(&shape), ShoulderPan::new(&shape));
+        Self::Pr2 {
+            roll: Arc::new(ClosedForm::new(shape.clone(), margined, roll)),
+            pan: Arc::new(ClosedForm::new(shape, margined, pan)),
         }
     }
 
     pub(crate) fn default(&self) -> &dyn InverseKinematics {
         match self {
-            Self::Pr2 { roll } => roll.as_ref(),
+            Self::Pr2 { roll, .. } => roll.as_ref(),
             Self::Numeric(numeric) => numeric.as_ref(),
         }
     }
 
     pub(crate) fn by(&self, joint: RedundantJoint) -> Option<&dyn InverseKinematics> {
         match (self, joint) {
-            (Self::Pr2 { roll }, RedundantJoint::UpperArmRoll) => Some(roll.as_ref()),
+            (Self::Pr2 { roll, .. }, RedundantJoint::UpperArmRoll) => Some(roll.as_ref()),
+            (Self::Pr2 { pan, .. }, RedundantJoint::ShoulderPan) => Some(pan.as_ref()),
             (Self::Numeric(_), _) => None,
         }
     }

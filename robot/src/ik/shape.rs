@@ -16,11 +16,11 @@ use crate::{JointVector, MAX_DOF};
 /// An arm's measures and how its joints map to the canonical ones.
 #[derive(Clone, Debug)]
 pub(crate) struct Pr2Shape {
-    /// Pan axis to shoulder. [m]
+    /// Pan axis to shoulder. \[m\]
     pub(crate) a: f64,
-    /// Shoulder to elbow. [m]
+    /// Shoulder to elbow. \[m\]
     pub(crate) l1: f64,
-    /// Elbow to wrist centre. [m]
+    /// Elbow to wrist centre. \[m\]
     pub(crate) l2: f64,
     /// Root frame in the canonical base frame (on the pan axis at the shoulder's height).
     from_root: Isometry3<f64>,
@@ -29,22 +29,18 @@ pub(crate) struct Pr2Shape {
     /// canonical = sign · joint + offset
     sign: [f64; 7],
     offset: [f64; 7],
-    /// Middle of each joint's range; 0 for continuous joints. [rad]
+    /// Middle of each joint's range; 0 for continuous joints. \[rad\]
     middle: [f64; 7],
     pub(crate) continuous: [bool; 7],
 }
 
 /// A target in canonical terms.
 pub(crate) struct WristTarget {
-    /// Wrist centre in the canonical base frame. [m]
+    /// Wrist centre in the canonical base frame. \[m\]
     pub(crate) centre: Vector3<f64>,
     /// Columns of the wrist's rotation in the canonical base frame.
     pub(crate) axes: [Vector3<f64>; 3],
 }
-
-/// Below this sine of the wrist flex the two rolls turn about one line, and only their sum (or
-/// difference, for the wrist folded back) is determined.
-pub(crate) const STRAIGHT: f64 = 1e-9;
 
 impl Pr2Shape {
     /// The measures of a chain of this shape, or `None` for any other.

@@ -1,0 +1,99 @@
+//! Kinematics on one core: `cargo bench -p nullsweep-robot`.
+
+use divan::{Bencher, black_box};
+use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Solutions};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn main() {
+    divan::main();
+}
+
+/// As many different configurations as make a branch predictor work.
+const COUNT: usize = 1024;
+
+fn pr2() -> Arm {
+    Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("the PR2 has a right arm")
+}
+
+fn configurations(arm: &Arm) -> Vec<JointVector> {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut one = || {
+        let mut q = [0.0; 8];
+        for (q, l) in q.iter_mut().zip(arm.limits()) {
+            *q = rng.random_range(l.lower.max(-3.0)..l.upper.min(3.0));
+        }
+        q
+    };
+    (0..COUNT).map(|_| one()).collect()
+}
+
+#[divan::bench]
+fn pr2_forward(bencher: Bencher<'_, '_>) {
+    let arm = pr2();
+    let qs = configurations(&arm);
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        arm.tip_pose(black_box(&qs[i]))
+    });
+}
+
+#[divan::bench]
+fn pr2_jacobian(bencher: Bencher<'_, '_>) {
+    let arm = pr2();
+    let qs = configurations(&arm);
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        arm.jacobian(black_box(&qs[i]))
+    });
+}
+
+#[divan::bench]
+fn pr2_link_poses(bencher: Bencher<'_, '_>) {
+    let arm = pr2();
+    let qs = configurations(&arm);
+    let mut out = vec![nalgebra::Isometry3::identity(); arm.robot().links().len()];
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        arm.link_poses(black_box(&qs[i]), &mut out);
+    });
+}
+
+#[divan::bench]
+fn pr2_inverse_all_for_one_roll(bencher: Bencher<'_, '_>) {
+    let arm = pr2();
+    let qs = configurations(&arm);
+    let targets: Vec<_> = qs.iter().map(|q| (arm.tip_pose(q), q[2])).collect();
+    let mut out = Solutions::new();
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        let (target, roll) = black_box(&targets[i]);
+        arm.ik().solve(target, *roll, &mut out);
+        out.len()
+    });
+}
+
+#[divan::bench]
+fn pr2_inverse_on_one_branch(bencher: Bencher<'_, '_>) {
+    let arm = pr2();
+    let qs = configurations(&arm);
+    let mut out = Solutions::new();
+    let cases: Vec<_> = qs
+        .iter()
+        .map(|q| {
+            let target = arm.tip_pose(q);
+            arm.ik().solve(&target, q[2], &mut out);
+            (target, *q, out[0].branch)
+        })
+        .collect();
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        let (target, q, branch) = black_box(&cases[i]);
+        arm.ik().solve_on(*branch, target, q[2], q)
+    });
+}
