@@ -39,7 +39,7 @@ impl ArmSpec {
 struct Posture([f64; 7]);
 
 /// Ready to work in front of the robot.
-const READY: Posture = Posture([-0.5, 0.35, -1.0, -1.6, 0.0, -1.0, 0.0]);
+const READY: Posture = Posture([-0.6, -0.03, -1.2, -1.6, -2.2, -1.45, 0.0]);
 /// Out of the way at the robot's side.
 const ASIDE: Posture = Posture([-1.4, 0.9, -0.6, -1.9, 0.0, -0.8, 0.0]);
 
