@@ -292,7 +292,7 @@ fn check_motion(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
         let seconds = (b.time - a.time) * 1e-9;
         for (j, bound) in guard.used().iter().enumerate() {
             let speed = top_speed(a, b, plan.interpolation, j);
-            let fits = speed * seconds <= bound.velocity * (seconds + ROUNDING_S) + SLACK;
+            let fits = speed * seconds <= bound.velocity() * (seconds + ROUNDING_S) + SLACK;
             let (low, high) = reach(a, b, plan.interpolation, j);
             let (lower, upper) = bound.limits_at(speed);
             let soft = Rejection::new(Reason::SoftLimit).knot(i + 1).joint(j);
@@ -307,7 +307,7 @@ fn check_motion(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
                 return Err(Rejection::new(Reason::Velocity)
                     .knot(i + 1)
                     .joint(j)
-                    .value(speed, bound.velocity));
+                    .value(speed, bound.velocity()));
             }
         }
     }

@@ -3,33 +3,30 @@
 
 use core::f64::consts::TAU;
 
-use crate::MAX_DOF;
+use nullsweep_robot::{JointLimits, JointVector, MAX_DOF};
 
 /// One value for each joint of the arm, chain order, unused entries 0. \[rad\] or \[m\]
-pub type Joints = [f64; MAX_DOF];
+pub type Joints = JointVector;
 
-/// What one joint may do.
+/// What one joint may do, as the robot crate reads it from the URDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointGuard {
-    /// Soft limits at stand-still, ±∞ for a continuous joint. \[rad\] or \[m\]
-    pub lower: f64,
-    /// See `lower`.
-    pub upper: f64,
-    /// How far both soft limits move in for each unit of speed: 1 / k_position. \[s\]
-    pub margin: f64,
-    /// Velocity limit. \[rad/s\] or \[m/s\]
-    pub velocity: f64,
-    /// Whether whole turns make no difference.
-    pub continuous: bool,
+    /// Soft limits, velocity, the gain that makes the braking margin.
+    pub limits: JointLimits,
 }
 
 impl JointGuard {
     /// The soft limits at a speed: moved in by the way that the PR2's position gain needs to
-    /// brake from it.
+    /// brake from it. The planner asks the same function.
     #[must_use]
     pub fn limits_at(&self, speed: f64) -> (f64, f64) {
-        let margin = self.margin * speed.abs();
-        (self.lower + margin, self.upper - margin)
+        self.limits.braking(speed)
+    }
+
+    /// Velocity limit. \[rad/s\] or \[m/s\]
+    #[must_use]
+    pub fn velocity(&self) -> f64 {
+        self.limits.velocity
     }
 
     /// `to - from`, by the shorter way around where the joint is continuous.
@@ -42,7 +39,7 @@ impl JointGuard {
     /// joint is continuous. \[rad\]
     #[must_use]
     pub fn turns(&self, reference: f64, value: f64) -> f64 {
-        if self.continuous { TAU * ((reference - value) / TAU).round() } else { 0.0 }
+        if self.limits.continuous { TAU * ((reference - value) / TAU).round() } else { 0.0 }
     }
 }
 
@@ -83,12 +80,20 @@ impl Guard {
     /// Guards these joints with the default parameters at a 1 kHz cycle. At most
     /// [`MAX_DOF`] joints are used.
     #[must_use]
-    pub fn new(joints: &[JointGuard]) -> Self {
-        let free =
-            JointGuard { lower: 0.0, upper: 0.0, margin: 0.0, velocity: 0.0, continuous: false };
+    pub fn new(joints: &[JointLimits]) -> Self {
+        let none = JointLimits {
+            lower: 0.0,
+            upper: 0.0,
+            velocity: 0.0,
+            acceleration: 0.0,
+            k_position: None,
+            continuous: false,
+        };
         let dof = joints.len().min(MAX_DOF);
-        let mut all = [free; MAX_DOF];
-        all[..dof].copy_from_slice(&joints[..dof]);
+        let mut all = [JointGuard { limits: none }; MAX_DOF];
+        for (guard, limits) in all.iter_mut().zip(joints) {
+            guard.limits = *limits;
+        }
         Self {
             dof,
             joints: all,
@@ -137,27 +142,14 @@ impl Guard {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use nullsweep_robot::{ArmSpec, Robot, Side};
+
     use super::*;
 
-    /// The PR2's right arm, as facts of the PR2 give it.
+    /// The PR2's right arm.
     pub(crate) fn pr2() -> Guard {
-        let j = |lower, upper, k: f64, velocity, continuous| JointGuard {
-            lower,
-            upper,
-            margin: 1.0 / k,
-            velocity,
-            continuous,
-        };
-        let inf = f64::INFINITY;
-        Guard::new(&[
-            j(-2.1353981634, 0.564601836603, 100.0, 2.088, false),
-            j(-0.3536, 1.2963, 100.0, 2.082, false),
-            j(-3.75, 0.65, 100.0, 3.27, false),
-            j(-2.1213, -0.15, 100.0, 3.3, false),
-            j(-inf, inf, f64::INFINITY, 3.6, true),
-            j(-2.0, -0.1, 20.0, 3.078, false),
-            j(-inf, inf, f64::INFINITY, 3.6, true),
-        ])
+        let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).unwrap();
+        Guard::new(arm.limits())
     }
 
     #[test]

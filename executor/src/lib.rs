@@ -16,10 +16,8 @@ mod path;
 #[cfg(test)]
 mod testing;
 
-/// Most joints of an arm.
-pub const MAX_DOF: usize = 8;
-
 pub use admit::{Held, Join, Rejection, Rules, ValidPlan, admit};
 pub use guard::{Guard, JointGuard, Joints};
 pub use interpolate::{PlanKnot, Sample, reach, sample, top_speed};
+pub use nullsweep_robot::MAX_DOF;
 pub use path::{Path, Progress};

@@ -205,7 +205,7 @@ impl Connector {
             let d = (to[j] - from[j]).abs();
             way = way.max(d);
             if d > 0.0 {
-                share_speed = share_speed.min(bound.velocity / d);
+                share_speed = share_speed.min(bound.velocity() / d);
             }
         }
         if !(way > 0.0) || !(share_speed > 0.0) {

@@ -269,7 +269,7 @@ impl Sim {
             assert!(target.q[j].is_finite() && target.v[j].is_finite());
             if let Some(last) = self.last {
                 let step = (target.q[j] - last[j]).abs();
-                let most = bound.velocity * self.guard.period() * (1.0 + 1e-6) + 1e-9;
+                let most = bound.velocity() * self.guard.period() * (1.0 + 1e-6) + 1e-9;
                 assert!(step <= most, "joint {j} stepped {step} at {:?}", target);
             }
             let a = (target.v[j] - self.last_v[j]).abs() / self.guard.period();

@@ -147,7 +147,7 @@ impl State {
                 return Err(Fault::NotFinite);
             }
             let step = (to - from).abs();
-            if step > bound.velocity * guard.period() * (1.0 + STEP_SLACK.0) + STEP_SLACK.1 {
+            if step > bound.velocity() * guard.period() * (1.0 + STEP_SLACK.0) + STEP_SLACK.1 {
                 return Err(Fault::Step);
             }
             // Coming back in from outside is allowed.

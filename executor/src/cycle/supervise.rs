@@ -219,7 +219,7 @@ impl State {
     /// Moves the commanded position towards a measured one, no faster than each joint may.
     fn creep(&mut self, to: &Joints, guard: &Guard) {
         for (j, bound) in guard.used().iter().enumerate() {
-            let step = bound.velocity * guard.period();
+            let step = bound.velocity() * guard.period();
             self.q[j] += (to[j] - self.q[j]).clamp(-step, step);
         }
         self.v = [0.0; MAX_DOF];
