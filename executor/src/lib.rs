@@ -9,15 +9,29 @@
 )]
 
 mod admit;
+mod cli;
 pub mod cycle;
+mod driver;
+mod executor;
 mod guard;
+mod hardware;
 mod interpolate;
 mod path;
+pub mod rt;
+mod service;
+mod slots;
 #[cfg(test)]
 mod testing;
+mod worker;
 
 pub use admit::{Held, Join, Rejection, Rules, ValidPlan, admit};
+pub use cli::main_with;
+pub use driver::Driver;
+pub use executor::{Config, ExecutorError, Summary, run};
 pub use guard::{Guard, JointGuard, Joints};
+pub use hardware::{Hardware, IpcHardware, Loopback};
 pub use interpolate::{PlanKnot, Sample, reach, sample, top_speed};
 pub use nullsweep_robot::MAX_DOF;
 pub use path::{Path, Progress};
+pub use rt::PoolAllocator;
+pub use slots::{Report, Slots};

@@ -1,0 +1,303 @@
+//! The command line: `executor run`, `executor ctl`.
+
+use std::ffi::OsString;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use clap::{Args, Parser, Subcommand};
+use nullsweep_ipc_types::ports::Ipc;
+use nullsweep_ipc_types::{CommandKind, Fault, Mode, Response, Verdict, service};
+use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
+
+use crate::executor::{Config, Summary, run};
+use crate::guard::Guard;
+
+/// How long `ctl` waits for an answer.
+const ANSWER_WITHIN: Duration = Duration::from_secs(1);
+
+/// Real-time executor: streams joint setpoints of published plans to a hardware endpoint.
+#[derive(Debug, Parser)]
+#[command(name = "executor", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Run until SIGINT or SIGTERM, then stop on the path and disable the motors.
+    Run(Box<RunArgs>),
+    /// Send a command to a running executor.
+    Ctl(CtlArgs),
+}
+
+#[derive(Debug, Args)]
+struct SystemArgs {
+    /// The robot's name in the services' names.
+    #[arg(long, default_value = service::DEFAULT_ROBOT)]
+    robot_name: String,
+    /// Folder that isolates this system from others on the machine.
+    #[arg(long, value_name = "PATH")]
+    ipc_root: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    #[command(flatten)]
+    system: SystemArgs,
+    /// The robot; the embedded PR2 where not given. Its limits are the ones that are enforced.
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
+    /// `right` or `left` for the PR2, else BASE:TIP, two links.
+    #[arg(long, default_value = "right")]
+    arm: String,
+    /// Cycles a second.
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(50..=4000))]
+    rate: u32,
+    /// Pin the loop to this CPU.
+    #[arg(long)]
+    cpu: Option<usize>,
+    /// SCHED_FIFO priority of the loop; 0 leaves it to the default scheduler.
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    priority: u8,
+    /// Spin the last microseconds before each deadline, where SCHED_FIFO is granted. Default: 75,
+    /// or 0 on a single core.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(0..=500))]
+    spin_us: Option<u32>,
+    /// Stop on the path when the joint state is older than this.
+    #[arg(long, default_value_t = 20.0)]
+    stale_ms: f64,
+    /// Fault when the joint state is older than this.
+    #[arg(long, default_value_t = 100.0)]
+    lost_ms: f64,
+    /// Fault when the mean rate over 600 ms is below this share of the rate.
+    #[arg(long, default_value_t = 0.75)]
+    min_rate: f64,
+    /// How far a plan's first knot may be from where the arm holds. [rad]
+    #[arg(long, default_value_t = 0.02)]
+    start_tolerance: f64,
+    /// How far a held joint (torso, other arm) may be from where a plan takes it. [rad or m]
+    #[arg(long, default_value_t = 0.01)]
+    held_tolerance: f64,
+    /// Following error that is allowed at stand-still. [rad]
+    #[arg(long, default_value_t = 0.1)]
+    following_error: f64,
+    /// Following error that is allowed for each unit of commanded speed. [s]
+    #[arg(long, default_value_t = 0.15)]
+    following_lag: f64,
+    /// Acceleration of stops, pauses and changes of speed along the path, each joint. [rad/s²]
+    #[arg(long, default_value_t = 10.0)]
+    stop_acceleration: f64,
+}
+
+#[derive(Debug, Args)]
+struct CtlArgs {
+    #[command(flatten)]
+    system: SystemArgs,
+    #[command(subcommand)]
+    order: Ctl,
+}
+
+#[derive(Clone, Copy, Debug, Subcommand)]
+enum Ctl {
+    /// Slow down to a stand-still on the path and keep the plan.
+    Pause,
+    /// Go on; after a halt or a disable, allow motion again.
+    Resume,
+    /// Ramp the speed to this percentage.
+    Speed {
+        /// 0 to 100.
+        percent: f64,
+    },
+    /// Slow down on the path, drop the plan, hold.
+    Stop {
+        /// Then ask the endpoint to disable its motors.
+        #[arg(long)]
+        disable: bool,
+    },
+    /// Clear a latched fault; the arm then holds where it is measured.
+    Reset,
+    /// Tell mode, fault, plan and speed.
+    Status,
+}
+
+/// The program: parses the arguments (the first one is the program's name), does what they say,
+/// and reports errors. Another program can call it to be an executor, given that it installs
+/// [`crate::PoolAllocator`] as its allocator.
+pub fn main_with<I, T>(args: I) -> ExitCode
+where
+    I: IntoIterator<Item = T>,
+    T: Into<OsString> + Clone,
+{
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(e) => {
+            let _ = e.print();
+            return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
+        }
+    };
+    let result = match cli.command {
+        Action::Run(args) => run_command(&args),
+        Action::Ctl(args) => ctl_command(&args),
+    };
+    match result {
+        Ok(code) => code,
+        Err(e) => {
+            eprintln!("executor: {e:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
+    // Another subscriber may be there where this runs inside another program.
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_target(false)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr)
+        .try_init();
+
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGTERM, SIGINT, SIGHUP] {
+        // The second signal ends the process at once, the first one stops the arm on its path.
+        flag::register_conditional_shutdown(signal, 1, stop.clone())?;
+        flag::register(signal, stop.clone())?;
+    }
+    let arm = arm(args)?;
+    let config = config(args, &arm)?;
+    tracing::info!(
+        "executor for robot `{}`: {} joints from {} to {}, {} Hz",
+        config.robot_name,
+        arm.dof(),
+        arm.spec().base,
+        arm.spec().tip,
+        args.rate
+    );
+    let summary = run(&arm, &config, &stop)?;
+    tracing::info!("{}", Told(summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn arm(args: &RunArgs) -> anyhow::Result<Arm> {
+    let robot = match &args.urdf {
+        Some(path) => Robot::from_urdf_file(path)
+            .with_context(|| format!("cannot read the robot from {}", path.display()))?,
+        None => Robot::pr2(),
+    };
+    let spec = match args.arm.as_str() {
+        "right" => ArmSpec::pr2(Side::Right),
+        "left" => ArmSpec::pr2(Side::Left),
+        links => match links.split_once(':') {
+            Some((base, tip)) => ArmSpec { base: base.into(), tip: tip.into() },
+            None => bail!("--arm takes `right`, `left` or BASE:TIP, not `{links}`"),
+        },
+    };
+    robot.arm(&spec).with_context(|| format!("arm `{}` of robot `{}`", args.arm, robot.name()))
+}
+
+fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
+    let positive = |name: &str, value: f64| {
+        if value.is_finite() && value > 0.0 {
+            Ok(value)
+        } else {
+            bail!("{name} must be a positive number, not {value}")
+        }
+    };
+    let nanos = |name: &str, ms: f64| positive(name, ms).map(|ms| (ms * 1e6) as u64);
+    let rate = f64::from(args.rate);
+    let guard = Guard {
+        period_ns: 1_000_000_000 / u64::from(args.rate),
+        stop_acceleration: positive("--stop-acceleration", args.stop_acceleration)?,
+        start_tolerance: positive("--start-tolerance", args.start_tolerance)?,
+        stale_ns: nanos("--stale-ms", args.stale_ms)?,
+        lost_ns: nanos("--lost-ms", args.lost_ms)?,
+        following_error: positive("--following-error", args.following_error)?,
+        following_lag: args.following_lag.max(0.0),
+        min_rate: args.min_rate.clamp(0.0, 1.0) * rate,
+        ..Guard::new(arm.limits())
+    };
+    if guard.lost_ns < guard.stale_ns {
+        bail!("--lost-ms must not be below --stale-ms");
+    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let spin_us = args.spin_us.unwrap_or(if cores > 1 { 75 } else { 0 });
+    Ok(Config {
+        robot_name: args.system.robot_name.clone(),
+        ipc_root: args.system.ipc_root.clone(),
+        guard,
+        held_tolerance: positive("--held-tolerance", args.held_tolerance)?,
+        priority: args.priority,
+        cpu: args.cpu,
+        spin_ns: u64::from(spin_us) * 1000,
+    })
+}
+
+fn ctl_command(args: &CtlArgs) -> anyhow::Result<ExitCode> {
+    let (kind, value) = match args.order {
+        Ctl::Pause => (CommandKind::Pause, 0.0),
+        Ctl::Resume => (CommandKind::Resume, 0.0),
+        Ctl::Speed { percent } => (CommandKind::Speed, percent / 100.0),
+        Ctl::Stop { disable: false } => (CommandKind::Stop, 0.0),
+        Ctl::Stop { disable: true } => (CommandKind::StopAndDisable, 0.0),
+        Ctl::Reset => (CommandKind::Reset, 0.0),
+        Ctl::Status => (CommandKind::Status, 0.0),
+    };
+    let ipc = Ipc::open(&args.system.robot_name, args.system.ipc_root.as_deref())?;
+    let response = ipc.command_client()?.call(kind, value, ANSWER_WITHIN)?;
+    println!("{}", Answer(&response));
+    let accepted = Verdict::from_wire(response.verdict) == Some(Verdict::Accepted);
+    Ok(if accepted { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// A response in words.
+struct Answer<'a>(&'a Response);
+
+impl std::fmt::Display for Answer<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let response = self.0;
+        let unknown = "unknown";
+        let verdict = Verdict::from_wire(response.verdict).map_or(unknown, Verdict::text);
+        let mode = Mode::from_wire(response.mode).map_or(unknown, Mode::text);
+        write!(f, "{verdict}: {mode}")?;
+        match Fault::from_wire(response.fault) {
+            Some(Fault::None) => {}
+            Some(fault) => write!(f, ", {fault}")?,
+            None => write!(f, ", fault {}", response.fault)?,
+        }
+        if response.plan.is_some() {
+            write!(f, ", plan {} at knot {}", response.plan, response.knot)?;
+        }
+        write!(f, ", speed {:.0} %", response.speed_scale * 100.0)
+    }
+}
+
+/// A summary in words.
+struct Told(Summary);
+
+impl std::fmt::Display for Told {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let s = &self.0;
+        write!(
+            f,
+            "{} cycles, {} deadlines missed; armed for {} cycles: {} system-heap calls, {} page \
+             faults; {} blocks from its own pool; {} port failures",
+            s.cycles,
+            s.missed,
+            s.armed_cycles,
+            s.heap_calls,
+            s.page_faults,
+            s.pool_calls,
+            s.failures
+        )
+    }
+}

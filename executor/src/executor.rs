@@ -1,0 +1,237 @@
+//! The three threads together: start, run, stop.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use nullsweep_ipc_types::ports::{Ipc, IpcError, now_ns};
+use nullsweep_ipc_types::{MAX_HELD_JOINTS, Mode};
+use nullsweep_robot::{Arm, JointKind};
+
+use crate::admit::Rules;
+use crate::cycle::{Ask, Order};
+use crate::driver::Driver;
+use crate::guard::Guard;
+use crate::hardware::{Hardware, IpcHardware};
+use crate::rt::{self, Grid};
+use crate::service::Service;
+use crate::slots::Slots;
+use crate::worker::Worker;
+
+/// The ticket of the shutdown order, which nobody waits for.
+const SHUTDOWN_TICKET: u64 = u64::MAX;
+/// Cycles that go on after a shutdown's stand-still, so that the endpoint hears the disable.
+const AFTERGLOW: u32 = 50;
+/// Cycles from the first Hold until the loop counts as armed: by then every port and page was used.
+const WARM_UP: u32 = 200;
+/// How long a shutdown may take before the threads are left behind.
+const SHUTDOWN_WITHIN: Duration = Duration::from_secs(5);
+
+/// How an executor runs.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// The robot's name in the services' names.
+    pub robot_name: String,
+    /// Isolates this system from others on the machine.
+    pub ipc_root: Option<PathBuf>,
+    /// The executor's own bounds; made from the arm's limits, see [`Guard::new`].
+    pub guard: Guard,
+    /// How far a held joint may be from where a plan takes it. \[rad\] or \[m\]
+    pub held_tolerance: f64,
+    /// `SCHED_FIFO` priority of the loop, 0 for the default scheduler.
+    pub priority: u8,
+    /// The CPU that the loop is pinned to.
+    pub cpu: Option<usize>,
+    /// The last part of each period that is spent spinning, where FIFO is granted. \[ns\]
+    pub spin_ns: u64,
+}
+
+/// Why an executor could not start or run to a clean end.
+#[derive(Debug, thiserror::Error)]
+pub enum ExecutorError {
+    /// A port could not be opened.
+    #[error(transparent)]
+    Ipc(#[from] IpcError),
+    /// The robot has more held joints than a plan can carry.
+    #[error("the robot has {count} joints beside the arm, a plan carries at most {most}")]
+    HeldJoints {
+        /// How many it has.
+        count: usize,
+        /// How many may be.
+        most: usize,
+    },
+    /// A thread could not be started.
+    #[error("a thread could not be started: {0}")]
+    Thread(#[from] std::io::Error),
+    /// A thread panicked.
+    #[error("the {0} thread ended unexpectedly")]
+    Died(&'static str),
+    /// The loop did not come to a stand-still.
+    #[error("the loop did not stop within {} s", .0.as_secs())]
+    Stuck(Duration),
+}
+
+/// What a run did, told at its end.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Summary {
+    /// Cycles since the start.
+    pub cycles: u64,
+    /// Deadlines missed.
+    pub missed: u64,
+    /// Cycles since the loop was armed.
+    pub armed_cycles: u64,
+    /// Calls into the system's heap by the armed loop.
+    pub heap_calls: u64,
+    /// Blocks that its own pool gave.
+    pub pool_calls: u64,
+    /// Page faults of the armed loop.
+    pub page_faults: i64,
+    /// Reads and writes at the endpoint that failed.
+    pub failures: u64,
+}
+
+/// Runs an executor for `arm` until `stop` is set, then stops on the path, disables the motors,
+/// tells every plan's end, and returns.
+///
+/// # Errors
+/// When a port is taken or cannot be opened, or a thread died.
+pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, ExecutorError> {
+    let rules = rules(arm, config)?;
+    let slots = Arc::new(Slots::default());
+    let done = AtomicBool::new(false);
+    let down = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let worker = spawn(scope, "worker", || {
+            let ipc = open(config)?;
+            let worker = Worker::open(&ipc, slots.clone(), rules)?;
+            worker.run(&done);
+            Ok(())
+        })?;
+        let service = spawn(scope, "service", || {
+            let ipc = open(config)?;
+            let service = Service::open(&ipc, slots.clone(), arm.dof())?;
+            service.run(&done);
+            Ok(())
+        })?;
+        let looping = spawn(scope, "loop", || {
+            // Before the first port, so that all their blocks are the pool's.
+            rt::enter_pool();
+            let ipc = open(config)?;
+            let hardware = IpcHardware::open(&ipc)?;
+            let driver = Driver::new(hardware, config.guard, slots.clone());
+            Ok(run_loop(driver, config, &down, &done))
+        })?;
+
+        let mut asked = None;
+        loop {
+            thread::sleep(Duration::from_millis(5));
+            let ended = worker.is_finished() || service.is_finished() || looping.is_finished();
+            if (stop.load(Ordering::Acquire) || ended) && asked.is_none() {
+                let ask = Ask { ticket: SHUTDOWN_TICKET, order: Order::Shutdown };
+                if slots.asks.push(ask).is_ok() {
+                    asked = Some(std::time::Instant::now());
+                }
+            }
+            let late = asked.is_some_and(|at| at.elapsed() > SHUTDOWN_WITHIN);
+            if down.load(Ordering::Acquire) || looping.is_finished() || late {
+                done.store(true, Ordering::Release);
+                let summary = joined("loop", looping);
+                joined("service", service)?;
+                joined("worker", worker)?;
+                return if late { Err(ExecutorError::Stuck(SHUTDOWN_WITHIN)) } else { summary };
+            }
+        }
+    })
+}
+
+/// The real-time loop itself.
+fn run_loop<H: Hardware>(
+    mut driver: Driver<H>,
+    config: &Config,
+    down: &AtomicBool,
+    done: &AtomicBool,
+) -> Summary {
+    let (fifo, denied) = rt::become_real_time(config.priority, config.cpu);
+    if !denied.is_empty() {
+        tracing::warn!(
+            "not real-time: {denied}. The loop runs on, later than it should. Give the process \
+             CAP_SYS_NICE and CAP_IPC_LOCK, or raise `ulimit -r` and `ulimit -l`."
+        );
+    }
+    let mut grid = Grid::start(config.guard.period_ns, if fifo { config.spin_ns } else { 0 });
+    let mut held = 0;
+    let mut afterglow = 0;
+    let mut armed: Option<(u64, i64)> = None;
+    let mut summary = Summary::default();
+    while afterglow < AFTERGLOW && !done.load(Ordering::Acquire) {
+        let wake = grid.wait();
+        driver.cycle(wake);
+        driver.account(wake);
+        summary.cycles += 1;
+        summary.missed += u64::from(wake.missed);
+        if driver.state().is_down() {
+            afterglow += 1;
+        }
+        if armed.is_none() && (held > 0 || driver.mode() == Mode::Hold) {
+            held += 1;
+            if held == WARM_UP {
+                armed = Some((summary.cycles, faults()));
+                rt::arm(true);
+            }
+        }
+    }
+    rt::arm(false);
+    if let Some((cycle, faults_then)) = armed {
+        summary.armed_cycles = summary.cycles - cycle;
+        summary.page_faults = faults() - faults_then;
+    }
+    let pool = rt::pool_use();
+    summary.heap_calls = pool.heap_calls;
+    summary.pool_calls = pool.pool_calls;
+    summary.failures = driver.failures();
+    down.store(true, Ordering::Release);
+    summary
+}
+
+fn faults() -> i64 {
+    let (minor, major) = rt::page_faults();
+    minor + major
+}
+
+fn rules(arm: &Arm, config: &Config) -> Result<Rules, ExecutorError> {
+    let held = arm.held_joints();
+    if held.len() > MAX_HELD_JOINTS {
+        return Err(ExecutorError::HeldJoints { count: held.len(), most: MAX_HELD_JOINTS });
+    }
+    let robot = arm.robot();
+    let continuous = |name: &str| {
+        robot.joints().iter().any(|j| j.name == name && j.kind == JointKind::Continuous)
+    };
+    Ok(Rules {
+        guard: config.guard,
+        fingerprint: arm.fingerprint(),
+        held_continuous: held.iter().map(|h| continuous(&h.name)).collect(),
+        held_tolerance: config.held_tolerance,
+        since_ns: now_ns(),
+    })
+}
+
+fn open(config: &Config) -> Result<Ipc, IpcError> {
+    Ipc::open(&config.robot_name, config.ipc_root.as_deref())
+}
+
+type Running<'scope, T> = thread::ScopedJoinHandle<'scope, Result<T, ExecutorError>>;
+
+fn spawn<'scope, T: Send + 'scope>(
+    scope: &'scope thread::Scope<'scope, '_>,
+    name: &str,
+    run: impl FnOnce() -> Result<T, ExecutorError> + Send + 'scope,
+) -> std::io::Result<Running<'scope, T>> {
+    thread::Builder::new().name(name.into()).spawn_scoped(scope, run)
+}
+
+fn joined<T>(name: &'static str, thread: Running<'_, T>) -> Result<T, ExecutorError> {
+    thread.join().map_err(|_| ExecutorError::Died(name))?
+}

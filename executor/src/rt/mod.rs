@@ -1,0 +1,105 @@
+//! What makes a thread real-time: scheduling, locked memory, a clock grid, and a heap of its own.
+//!
+//! The one place of the executor with `unsafe`.
+#![allow(unsafe_code, reason = "scheduling and allocation have no safe interface")]
+
+mod grid;
+mod pool;
+
+use std::fmt;
+use std::io;
+use std::num::NonZeroU64;
+
+use rustix::mm::{MlockAllFlags, mlockall};
+use rustix::thread::{CpuSet, sched_setaffinity, set_current_timer_slack};
+
+pub use grid::{Grid, Wake};
+pub use pool::{PoolAllocator, PoolUse, arm, enter_pool, pool_use};
+
+/// Stack that is touched before the loop starts. \[bytes\]
+const STACK: usize = 256 << 10;
+
+/// What was asked for and not granted. The executor warns once and runs on.
+#[derive(Debug, Default)]
+pub struct Denied {
+    whats: Vec<(&'static str, io::Error)>,
+}
+
+impl Denied {
+    /// Whether everything was granted.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.whats.is_empty()
+    }
+
+    fn note(&mut self, what: &'static str, result: io::Result<()>) -> bool {
+        match result {
+            Ok(()) => true,
+            Err(e) => {
+                self.whats.push((what, e));
+                false
+            }
+        }
+    }
+}
+
+impl fmt::Display for Denied {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, (what, e)) in self.whats.iter().enumerate() {
+            write!(f, "{}{what} ({e})", if i > 0 { ", " } else { "" })?;
+        }
+        Ok(())
+    }
+}
+
+/// Makes the calling thread real-time: `SCHED_FIFO` at `priority` (0 leaves the scheduler as it
+/// is), pinned to `cpu`, all memory of the process locked as it is touched, stack touched. What is
+/// not permitted is noted; whether FIFO was granted is returned beside it.
+#[must_use]
+pub fn become_real_time(priority: u8, cpu: Option<usize>) -> (bool, Denied) {
+    let mut denied = Denied::default();
+    let lock = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
+    denied.note("locking memory", mlockall(lock).map_err(io::Error::from));
+    if let Some(cpu) = cpu {
+        let mut set = CpuSet::new();
+        set.set(cpu);
+        denied.note("pinning to a CPU", sched_setaffinity(None, &set).map_err(io::Error::from));
+    }
+    let fifo = priority > 0 && denied.note("SCHED_FIFO", set_fifo(priority));
+    if !fifo {
+        // Without FIFO the kernel may wake us up to 50 µs late to save power.
+        let slack = set_current_timer_slack(NonZeroU64::new(1)).map_err(io::Error::from);
+        denied.note("timer slack", slack);
+    }
+    touch_stack();
+    (fifo, denied)
+}
+
+/// Page faults of the calling thread so far: those served from memory, and from disk.
+#[must_use]
+pub fn page_faults() -> (i64, i64) {
+    // SAFETY: an all-zero rusage is a valid value, and getrusage writes only to it.
+    let usage = unsafe {
+        let mut usage: libc::rusage = std::mem::zeroed();
+        libc::getrusage(libc::RUSAGE_THREAD, &raw mut usage);
+        usage
+    };
+    (usage.ru_minflt, usage.ru_majflt)
+}
+
+fn set_fifo(priority: u8) -> io::Result<()> {
+    let param = libc::sched_param { sched_priority: libc::c_int::from(priority) };
+    // SAFETY: pid 0 is the calling thread, and `param` outlives the call.
+    let result = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const param) };
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}
+
+/// Writes to every page of the stack that the loop may come to use.
+#[inline(never)]
+fn touch_stack() {
+    let mut stack = [0u8; STACK];
+    for page in stack.iter_mut().step_by(4096) {
+        *page = 1;
+    }
+    std::hint::black_box(&stack);
+}

@@ -1,0 +1,179 @@
+//! The service thread: commands answered at once, events, telemetry. It never waits for anything
+//! but the loop's next cycle.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use nullsweep_ipc_types::ports::{CommandServer, Ipc, IpcError, Sender, now_ns};
+use nullsweep_ipc_types::{
+    Command, CommandKind, Fault, MAX_JOINTS, Mode, PlanEvent, PlanId, Response, Telemetry, Verdict,
+};
+
+use crate::cycle::{Ask, Event, Order, Reply, Snapshot};
+use crate::driver::widen;
+use crate::slots::{Report, Slots};
+
+/// Pause between two rounds.
+const ROUND: Duration = Duration::from_micros(500);
+/// How long an answer of the loop is waited for.
+const ANSWER_WITHIN: Duration = Duration::from_millis(50);
+/// How long the last events stay readable after the end: a publisher that exits takes what was
+/// not yet read with it.
+const LINGER: Duration = Duration::from_millis(200);
+
+/// The ports and what was last told. Make it on the thread that runs it.
+#[derive(Debug)]
+pub(crate) struct Service {
+    slots: Arc<Slots>,
+    server: CommandServer,
+    telemetry: Sender<Telemetry>,
+    events: Sender<PlanEvent>,
+    joint_count: usize,
+    told: u64,
+    snapshots: u64,
+    tickets: u64,
+    newest: Option<Snapshot>,
+}
+
+impl Service {
+    pub(crate) fn open(ipc: &Ipc, slots: Arc<Slots>, joint_count: usize) -> Result<Self, IpcError> {
+        Ok(Self {
+            slots,
+            server: ipc.command_server()?,
+            telemetry: ipc.telemetry_sender()?,
+            events: ipc.event_sender()?,
+            joint_count,
+            told: 0,
+            snapshots: 0,
+            tickets: 0,
+            newest: None,
+        })
+    }
+
+    /// Runs until `done`, then tells what is left.
+    pub(crate) fn run(mut self, done: &AtomicBool) {
+        while !done.load(Ordering::Acquire) {
+            self.round();
+            thread::sleep(ROUND);
+        }
+        let end = Instant::now() + LINGER;
+        while Instant::now() < end {
+            self.round();
+            thread::sleep(ROUND);
+        }
+    }
+
+    fn round(&mut self) {
+        while let Some(event) = self.slots.events.pop() {
+            self.told += 1;
+            let event = on_wire(&event, self.told);
+            if let Err(e) = self.events.send(&event) {
+                tracing::error!("plan event lost: {e}");
+            }
+        }
+        // Late listeners get the history also while nothing new happens.
+        let _ = self.events.connect();
+        if let Some(report) = self.slots.reports.pop() {
+            self.snapshots += 1;
+            self.newest = Some(report.snapshot);
+            let telemetry = self.telemetry_of(&report);
+            if let Err(e) = self.telemetry.send(&telemetry) {
+                tracing::warn!("telemetry lost: {e}");
+            }
+        }
+        let Self { server, slots, tickets, newest, .. } = self;
+        let answered = server.answer(|command| respond(command, slots, tickets, *newest));
+        if let Err(e) = answered {
+            tracing::warn!("a command was not answered: {e}");
+        }
+    }
+
+    fn telemetry_of(&self, report: &Report) -> Telemetry {
+        let snapshot = &report.snapshot;
+        Telemetry {
+            sequence: self.snapshots,
+            stamp_ns: report.stamp_ns,
+            cycle: snapshot.cycle,
+            missed_cycles: snapshot.missed,
+            plan: snapshot.plan,
+            plan_time_ns: snapshot.plan_time_ns,
+            speed_scale: snapshot.rate,
+            commanded: widen(&snapshot.commanded),
+            measured: widen(&snapshot.measured),
+            lateness: report.lateness,
+            compute: report.compute,
+            joint_count: self.joint_count.min(MAX_JOINTS) as u32,
+            mode: snapshot.mode.wire(),
+            fault: snapshot.fault.wire(),
+            knot: snapshot.knot,
+        }
+    }
+}
+
+/// Asks the loop and waits for its answer: one or two cycles.
+fn respond(
+    command: &Command,
+    slots: &Slots,
+    tickets: &mut u64,
+    newest: Option<Snapshot>,
+) -> Response {
+    let Some(order) = order(command) else {
+        return response(Verdict::Unknown, newest);
+    };
+    *tickets += 1;
+    let ticket = *tickets;
+    if slots.asks.push(Ask { ticket, order }).is_err() {
+        return response(Verdict::Busy, newest);
+    }
+    let start = Instant::now();
+    while start.elapsed() < ANSWER_WITHIN {
+        while let Some(reply) = slots.replies.pop() {
+            if reply.ticket == ticket {
+                let Reply { verdict, snapshot, .. } = reply;
+                return response(verdict, Some(snapshot));
+            }
+        }
+        thread::sleep(Duration::from_micros(100));
+    }
+    response(Verdict::Busy, newest)
+}
+
+fn order(command: &Command) -> Option<Order> {
+    Some(match CommandKind::from_wire(command.kind)? {
+        CommandKind::Status => Order::Status,
+        CommandKind::Pause => Order::Pause,
+        CommandKind::Resume => Order::Resume,
+        CommandKind::Stop => Order::Stop,
+        CommandKind::StopAndDisable => Order::StopAndDisable,
+        CommandKind::Speed => Order::Speed(command.value),
+        CommandKind::Reset => Order::Reset,
+    })
+}
+
+fn response(verdict: Verdict, snapshot: Option<Snapshot>) -> Response {
+    Response {
+        stamp_ns: now_ns(),
+        plan: snapshot.map_or(PlanId::NONE, |s| s.plan),
+        speed_scale: snapshot.map_or(0.0, |s| s.scale),
+        verdict: verdict.wire(),
+        mode: snapshot.map_or(Mode::Init, |s| s.mode).wire(),
+        fault: snapshot.map_or(Fault::None, |s| s.fault).wire(),
+        knot: snapshot.map_or(0, |s| s.knot),
+    }
+}
+
+fn on_wire(event: &Event, sequence: u64) -> PlanEvent {
+    PlanEvent {
+        sequence,
+        stamp_ns: now_ns(),
+        plan: event.plan,
+        value: event.why.value,
+        bound: event.why.bound,
+        kind: event.kind.wire(),
+        reason: event.why.reason.wire(),
+        joint: event.why.joint,
+        knot: event.why.knot,
+    }
+}

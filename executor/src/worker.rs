@@ -1,0 +1,96 @@
+//! The worker thread: takes plans out of shared memory, admits them, frees old ones, sweeps up
+//! after processes that died. Nothing here is urgent enough to disturb the other two.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use nullsweep_ipc_types::ports::{Ipc, IpcError, PlanReceiver, now_ns};
+use nullsweep_ipc_types::{EventKind, Knot, MAX_KNOTS, Reason};
+
+use crate::admit::{Held, Rejection, Rules, admit};
+use crate::cycle::Event;
+use crate::slots::Slots;
+
+/// Pause between two looks.
+const ROUND: Duration = Duration::from_millis(1);
+/// Pause between two sweeps for dead processes.
+const SWEEP: Duration = Duration::from_secs(1);
+
+/// The plan port and the memory for private copies. Make it on the thread that runs it.
+#[derive(Debug)]
+pub(crate) struct Worker<'a> {
+    ipc: &'a Ipc,
+    receiver: PlanReceiver,
+    slots: Arc<Slots>,
+    rules: Rules,
+    copy: Vec<Knot>,
+    held: Option<Held>,
+}
+
+impl<'a> Worker<'a> {
+    pub(crate) fn open(ipc: &'a Ipc, slots: Arc<Slots>, rules: Rules) -> Result<Self, IpcError> {
+        let receiver = ipc.plan_receiver()?;
+        Ok(Self { ipc, receiver, slots, rules, copy: Vec::with_capacity(MAX_KNOTS), held: None })
+    }
+
+    /// Runs until `done`.
+    pub(crate) fn run(mut self, done: &AtomicBool) {
+        let mut swept = Instant::now();
+        while !done.load(Ordering::Acquire) {
+            while let Some(plan) = self.slots.retired.pop() {
+                drop(plan);
+            }
+            if let Some(held) = self.slots.held.pop() {
+                self.held = Some(held);
+            }
+            self.take_plan();
+            if swept.elapsed() >= SWEEP {
+                let count = self.ipc.sweep_dead_nodes();
+                if count > 0 {
+                    tracing::info!("swept up after {count} dead processes");
+                }
+                swept = Instant::now();
+            }
+            thread::sleep(ROUND);
+        }
+    }
+
+    /// Takes at most one plan out of shared memory.
+    fn take_plan(&mut self) {
+        let plan = match self.receiver.receive() {
+            Ok(Some(plan)) => plan,
+            Ok(None) => return,
+            Err(e) => {
+                tracing::warn!("plans cannot be received: {e}");
+                return;
+            }
+        };
+        // The publisher can still write to what it sent: only the copy is looked at.
+        let header = *plan.header();
+        self.copy.clear();
+        self.copy.extend_from_slice(&plan.knots()[..plan.knots().len().min(MAX_KNOTS)]);
+        drop(plan);
+
+        let start = Instant::now();
+        let admitted = admit(&header, &self.copy, self.held.as_ref(), &self.rules, now_ns());
+        let result = admitted.and_then(|plan| {
+            tracing::info!(
+                "plan {}: {} knots, {:.1} s, checked in {:.2} ms",
+                header.id,
+                plan.knots().len(),
+                plan.duration() * 1e-9,
+                start.elapsed().as_secs_f64() * 1e3,
+            );
+            self.slots.offers.push(Arc::new(plan)).map_err(|_| Rejection::new(Reason::QueueFull))
+        });
+        if let Err(why) = result {
+            tracing::warn!("plan {} rejected: {why}", header.id);
+            let event = Event { plan: header.id, kind: EventKind::Rejected, why };
+            if self.slots.events.push(event).is_err() {
+                tracing::error!("the rejection of plan {} could not be told", header.id);
+            }
+        }
+    }
+}
