@@ -1,41 +1,21 @@
 //! The PR2's arms against the published robot and against themselves.
 
+mod common;
+
 use std::fs::File;
 use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
 
+use common::{data, farthest, random};
 use flate2::read::GzDecoder;
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use nullsweep_robot::{
     Arm, ArmSpec, InverseKinematics, JointVector, RedundantJoint, Robot, Side, Solutions,
 };
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-fn data(path: &str) -> Option<PathBuf> {
-    let file = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")).join(path);
-    if file.exists() {
-        return Some(file);
-    }
-    println!("skipped: {} is not there", file.display());
-    None
-}
 
 fn arm(side: Side) -> Arm {
     Robot::pr2().arm(&ArmSpec::pr2(side)).unwrap()
-}
-
-/// Uniform in the limits, continuous joints in ±π.
-fn random(arm: &Arm, rng: &mut impl Rng) -> JointVector {
-    let mut q = [0.0; 8];
-    for (q, limits) in q.iter_mut().zip(arm.limits()) {
-        *q = if limits.continuous {
-            rng.random_range(-std::f64::consts::PI..std::f64::consts::PI)
-        } else {
-            rng.random_range(limits.lower..limits.upper)
-        };
-    }
-    q
 }
 
 #[test]
@@ -63,16 +43,6 @@ fn agrees_with_the_published_robot() {
             assert!((a.to_homogeneous() - b.to_homogeneous()).amax() < 1e-12);
         }
     }
-}
-
-/// Difference of two angles by whole turns.
-fn apart(a: f64, b: f64) -> f64 {
-    let d = (a - b).rem_euclid(std::f64::consts::TAU);
-    d.min(std::f64::consts::TAU - d)
-}
-
-fn farthest(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| apart(*a, *b)).fold(0.0, f64::max)
 }
 
 #[derive(serde::Deserialize)]

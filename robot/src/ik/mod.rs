@@ -1,6 +1,7 @@
 //! Inverse kinematics behind one trait.
 
 mod closed;
+mod folds;
 mod lanes;
 mod numeric;
 mod pan;
@@ -56,7 +57,8 @@ pub trait InverseKinematics: Send + Sync {
     /// All solutions for a pose of the tip in the root frame at one value of the redundancy.
     ///
     /// `out` is cleared first. Joints with limits take the value nearest to the middle of their
-    /// range, continuous joints one in (−π, π]. Not filtered by limits.
+    /// range, continuous joints one in (−π, π]. The closed form's are not filtered by limits; the
+    /// numeric solver looks only inside the margined limits.
     fn solve(&self, target: &Isometry3<f64>, redundancy: f64, out: &mut Solutions);
 
     /// The solution on one branch, continuous joints unwrapped nearest to `near`.
