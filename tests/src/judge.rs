@@ -300,17 +300,14 @@ impl Judge {
         let elapsed = (s.sequence - last.sequence) as f64 * self.rules.period_ns as f64 * 1e-9;
         let rates: JointVector =
             std::array::from_fn(|j| (positions[j] - last.positions[j]) / elapsed);
-        let mut ratio = 0.0;
-        // When the executor leaves a fault, it begins again from where the arm was measured.
-        let resynchronised = matches!(last.mode, Some(Mode::Init | Mode::Fault))
-            && !matches!(mode, Some(Mode::Init | Mode::Fault));
-        if resynchronised {
+        // When the executor leaves a fault, it begins again from where the arm was measured, and
+        // gets there without a jump.
+        let idle = |mode| matches!(mode, Some(Mode::Init | Mode::Fault));
+        if idle(last.mode) && !idle(mode) {
             self.check_start(s, &positions, measured);
-            self.check_limits(s, &positions, &JointVector::default(), &feed_forward);
-        } else {
-            ratio = self.check_steps(s, &rates, elapsed);
-            self.check_limits(s, &positions, &rates, &feed_forward);
         }
+        let ratio = self.check_steps(s, &rates, elapsed);
+        self.check_limits(s, &positions, &rates, &feed_forward);
         self.follow_plan(s, &last, &rates, ratio);
         self.keep(s, mode, positions, rates);
     }

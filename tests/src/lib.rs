@@ -5,11 +5,14 @@
 //! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all.
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
 //! * [`witness`]: watches an executor from outside.
+//! * [`latency`]: the latency lab.
 
 pub mod arm_args;
+pub mod clock;
 pub mod endpoint;
 pub mod fault;
 pub mod judge;
+pub mod latency;
 pub mod mock;
 pub mod parts;
 pub mod publisher;

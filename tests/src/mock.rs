@@ -14,12 +14,11 @@ use clap::Parser;
 use comfy_table::{Table, presets};
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::service;
-use rustix::thread::clock_nanosleep_absolute;
-use rustix::time::{ClockId, Timespec};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::arm_args::{ArmArgs, initial_posture};
+use crate::clock::Grid;
 use crate::endpoint::{Behaviour, Deeds, Endpoint};
 use crate::fault::FaultAt;
 use crate::judge::{Rules, Verdict};
@@ -120,17 +119,13 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
 
     let mut pass = Vec::with_capacity(2 * service::SETPOINT.buffer);
     let mut newest = None;
-    let mut due_ns = start_ns;
+    let mut grid = Grid::new(PERIOD_NS);
     let mut own_late_cycles = 0;
     let mut now = start_ns;
     while !stop.load(Ordering::Relaxed) && end_ns.is_none_or(|end| now < end) {
-        due_ns += PERIOD_NS;
-        sleep_until(due_ns);
-        now = now_ns();
-        if now > due_ns + PERIOD_NS {
-            own_late_cycles += 1;
-            due_ns += (now - due_ns) / PERIOD_NS * PERIOD_NS;
-        }
+        let tick = grid.wait();
+        now = tick.now_ns;
+        own_late_cycles += u64::from(tick.skipped > 0);
         pass.clear();
         // At most one buffer and what comes meanwhile: a fast sender cannot hold the loop.
         while pass.len() < pass.capacity()
@@ -163,15 +158,6 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     report(args, &outcome)?;
     Ok(outcome)
-}
-
-fn sleep_until(due_ns: u64) {
-    let due = Timespec {
-        tv_sec: (due_ns / 1_000_000_000) as i64,
-        tv_nsec: (due_ns % 1_000_000_000) as i64,
-    };
-    // A signal that interrupts the sleep only makes one cycle early.
-    let _ = clock_nanosleep_absolute(ClockId::Monotonic, &due);
 }
 
 fn report(args: &Args, outcome: &Outcome) -> anyhow::Result<()> {

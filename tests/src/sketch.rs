@@ -80,6 +80,23 @@ impl Sketch {
         Self::through(arm, &postures, speed)
     }
 
+    /// Every joint out by `angle` and back, in so many knots and seconds.
+    #[must_use]
+    pub fn twitch(arm: &Arm, from: &JointVector, angle: f64, knots: u32, seconds: f64) -> Self {
+        let out = swung(arm, from, angle);
+        let mut sketch = Self::through(arm, &[*from, out, *from], 1.0);
+        sketch.knots = (0..knots)
+            .map(|k| {
+                let share = f64::from(k) / f64::from(knots - 1);
+                let bump = 1.0 - (2.0 * share - 1.0).abs();
+                let q: JointVector = std::array::from_fn(|j| from[j] + (out[j] - from[j]) * bump);
+                knot(arm, (share * seconds * 1e9).round() as u64, &q)
+            })
+            .collect();
+        sketch.header.knot_count = knots;
+        sketch
+    }
+
     /// The same plan, joining knot `knot` of `plan` without a stop.
     #[must_use]
     pub fn at_knot(mut self, plan: PlanId, knot: u32) -> Self {
