@@ -9,11 +9,25 @@ use serde::Serialize;
 
 use crate::fault::{FaultAt, FaultKind};
 use crate::judge::{Judge, Rules};
+use crate::mechanism::{Mechanism, UnknownMechanism};
+use crate::plant::Plant;
 use crate::servo::Servo;
+
+/// How true to a robot the simulated arm is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Fidelity {
+    /// Joints without dynamics behind a stiff position loop, see [`Servo`].
+    #[default]
+    Servo,
+    /// Motors that take effort, transmissions, inertia and safety controllers, see [`Mechanism`].
+    Mechanism,
+}
 
 /// How the endpoint behaves.
 #[derive(Clone, Debug, Default)]
 pub struct Behaviour {
+    /// What stands behind the setpoints.
+    pub fidelity: Fidelity,
     /// What the judge allows; its `session_timeout_ns` is also the endpoint's own watchdog.
     pub rules: Rules,
     /// Faults to play.
@@ -34,12 +48,11 @@ pub struct Deeds {
 }
 
 /// A simulated arm behind the setpoint and state services.
-#[derive(Clone)]
 pub struct Endpoint {
     dof: usize,
     behaviour: Behaviour,
     started_ns: u64,
-    servo: Servo,
+    plant: Box<dyn Plant>,
     judge: Judge,
     held: Vec<f64>,
     /// Whether the arm follows setpoints. It begins to with one that is where the arm is.
@@ -61,12 +74,23 @@ struct Received {
 
 impl Endpoint {
     /// An arm at rest at `initial`, with its held joints where `arm` holds them.
-    #[must_use]
-    pub fn new(arm: &Arm, initial: JointVector, behaviour: Behaviour, now_ns: u64) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// A mechanism was asked for that is not known.
+    pub fn new(
+        arm: &Arm,
+        initial: JointVector,
+        behaviour: Behaviour,
+        now_ns: u64,
+    ) -> Result<Self, UnknownMechanism> {
+        let plant: Box<dyn Plant> = match behaviour.fidelity {
+            Fidelity::Servo => Box::new(Servo::new(arm, initial, now_ns)),
+            Fidelity::Mechanism => Box::new(Mechanism::new(arm, initial, now_ns)?),
+        };
+        Ok(Self {
             dof: arm.dof(),
             started_ns: now_ns,
-            servo: Servo::new(arm, initial, now_ns),
+            plant,
             judge: Judge::new(arm, behaviour.rules.clone()),
             held: arm.held_joints().iter().map(|h| h.position).take(MAX_HELD_JOINTS).collect(),
             behaviour,
@@ -77,7 +101,7 @@ impl Endpoint {
             frozen: None,
             sequence: 0,
             deeds: Deeds::default(),
-        }
+        })
     }
 
     /// The judge of all setpoints so far.
@@ -92,10 +116,10 @@ impl Endpoint {
         self.deeds
     }
 
-    /// Where the arm truly is, whatever a fault makes it report. \[rad\] or \[m\]
+    /// Where the arm is measured, whatever a fault makes it report. \[rad\] or \[m\]
     #[must_use]
     pub fn positions(&self) -> &JointVector {
-        self.servo.positions()
+        self.plant.measured()
     }
 
     /// Whether it stands because setpoints ceased.
@@ -107,7 +131,7 @@ impl Endpoint {
     /// Judges and follows what one reading pass took out of the buffer, oldest first.
     pub fn receive(&mut self, pass: &[Setpoint], now_ns: u64) {
         if !pass.is_empty() {
-            let measured = *self.servo.positions();
+            let measured = *self.plant.measured();
             self.judge.observe(pass, &measured);
         }
         for setpoint in pass {
@@ -116,9 +140,9 @@ impl Endpoint {
             self.follow(setpoint, now_ns);
         }
         self.watch(now_ns);
-        self.servo.advance(now_ns);
+        self.plant.advance(now_ns);
         if self.is_active(FaultKind::Halt, now_ns) {
-            self.servo.lock();
+            self.plant.release();
             self.following = false;
         }
     }
@@ -138,8 +162,8 @@ impl Endpoint {
         set(status::SETPOINT_TIMEOUT, self.timed_out);
         set(status::ERROR, active(FaultKind::Error));
 
-        let mut positions = *self.servo.positions();
-        let mut velocities = *self.servo.velocities();
+        let mut positions = *self.plant.measured();
+        let mut velocities = *self.plant.velocities();
         if active(FaultKind::Jump) {
             positions[0] += 0.1;
         }
@@ -165,6 +189,7 @@ impl Endpoint {
         }
         state.positions[..self.dof].copy_from_slice(&positions[..self.dof]);
         state.velocities[..self.dof].copy_from_slice(&velocities[..self.dof]);
+        state.efforts[..self.dof].copy_from_slice(&self.plant.efforts()[..self.dof]);
         state.held_positions[..self.held.len()].copy_from_slice(&self.held);
         state.held_count = self.held.len() as u32;
         state.joint_count = joint_count;
@@ -185,8 +210,8 @@ impl Endpoint {
         if self.timed_out || now_ns <= end_ns {
             return;
         }
-        self.servo.advance(end_ns);
-        self.servo.hold();
+        self.plant.advance(end_ns);
+        self.plant.hold();
         self.timed_out = true;
         self.following = false;
         self.deeds.timeouts += 1;
@@ -205,7 +230,7 @@ impl Endpoint {
         self.timed_out = false;
         if setpoint.disable != 0 && !self.disabled {
             self.deeds.disabled += 1;
-            self.servo.lock();
+            self.plant.release();
         }
         self.disabled = setpoint.disable != 0;
         if self.disabled
@@ -216,7 +241,7 @@ impl Endpoint {
             return;
         }
         if !self.following {
-            let measured = self.servo.positions();
+            let measured = self.plant.measured();
             let off = |j: usize| (setpoint.positions[j] - measured[j]).abs();
             let tolerance = self.behaviour.rules.start_tolerance;
             if (0..self.dof).any(|j| off(j) > tolerance) {
@@ -225,7 +250,7 @@ impl Endpoint {
             }
             self.following = true;
         }
-        self.servo.follow(setpoint);
+        self.plant.follow(setpoint);
     }
 }
 
@@ -251,7 +276,7 @@ mod tests {
                 Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("the PR2 has a right arm");
             let faults = faults.iter().map(|f| f.parse().expect("a fault")).collect();
             let behaviour = Behaviour { faults, ..Behaviour::default() };
-            let endpoint = Endpoint::new(&arm, arm.home(), behaviour, 0);
+            let endpoint = Endpoint::new(&arm, arm.home(), behaviour, 0).expect("a PR2 arm");
             Self { endpoint, home: arm.home(), sequence: 0, moved: 0.0 }
         }
 

@@ -1,7 +1,8 @@
 //! The rehearsal stage of Nullsweep: everything that a plan meets before it meets a robot.
 //!
 //! * [`mock`]: a simulated arm as a process, made of an [`endpoint`] (setpoints and a time in,
-//!   states out), a joint [`servo`], the [`judge`] of every setpoint, and [`fault`]s on request.
+//!   states out), a [`plant`] (a joint [`servo`], or the PR2's [`mechanism`]), the [`judge`] of
+//!   every setpoint, and [`fault`]s on request.
 //! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all.
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
 //! * [`witness`]: watches an executor from outside.
@@ -13,8 +14,10 @@ pub mod endpoint;
 pub mod fault;
 pub mod judge;
 pub mod latency;
+pub mod mechanism;
 pub mod mock;
 pub mod parts;
+pub mod plant;
 pub mod publisher;
 pub mod record;
 pub mod servo;

@@ -19,7 +19,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::arm_args::{ArmArgs, initial_posture};
 use crate::clock::Grid;
-use crate::endpoint::{Behaviour, Deeds, Endpoint};
+use crate::endpoint::{Behaviour, Deeds, Endpoint, Fidelity};
 use crate::fault::FaultAt;
 use crate::judge::{Rules, Verdict};
 use crate::record::Recorder;
@@ -38,6 +38,9 @@ struct Args {
     /// Where the joints stand at first, base to tip; without it, the arm's home, in rad
     #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "Q1,Q2,…")]
     initial: Vec<f64>,
+    /// How true to a robot the arm is
+    #[arg(long, value_enum, default_value_t)]
+    fidelity: Fidelity,
     /// End after so many seconds
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -111,9 +114,9 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
 
     let rules =
         Rules { session_timeout_ns: args.timeout.saturating_mul(1_000_000), ..Rules::default() };
-    let behaviour = Behaviour { rules, faults: args.fault.clone() };
+    let behaviour = Behaviour { fidelity: args.fidelity, rules, faults: args.fault.clone() };
     let start_ns = now_ns();
-    let mut endpoint = Endpoint::new(&arm, initial, behaviour, start_ns);
+    let mut endpoint = Endpoint::new(&arm, initial, behaviour, start_ns)?;
     let mut recorder = Recorder::new(args.record_every.max(1) * 1_000_000);
     let end_ns = args.seconds.map(|s| start_ns + Duration::from_secs_f64(s).as_nanos() as u64);
 

@@ -4,8 +4,9 @@
 use nullsweep_ipc_types::Setpoint;
 use nullsweep_robot::{Arm, JointVector};
 
-/// The simulated joints at one moment. Time is given in, so a stalled process simulates what the
-/// arm did meanwhile, not a jump.
+use crate::plant::Plant;
+
+/// Joints without inertia.
 #[derive(Clone, Debug)]
 pub struct Servo {
     /// Natural frequency of the loop. \[rad/s\]
@@ -15,6 +16,7 @@ pub struct Servo {
     now_ns: u64,
     positions: JointVector,
     velocities: JointVector,
+    efforts: JointVector,
     target: Target,
 }
 
@@ -45,53 +47,17 @@ impl Servo {
         let velocities = JointVector::default();
         let target = Target { positions, velocities, reached_ns: now_ns };
         let dof = arm.dof();
-        Self { omega: Self::OMEGA, speed_limits, dof, now_ns, positions, velocities, target }
-    }
-
-    /// Joint positions at the time of the last call. \[rad\] or \[m\]
-    #[must_use]
-    pub fn positions(&self) -> &JointVector {
-        &self.positions
-    }
-
-    /// Joint velocities at the time of the last call. \[rad/s\] or \[m/s\]
-    #[must_use]
-    pub fn velocities(&self) -> &JointVector {
-        &self.velocities
-    }
-
-    /// Follows the setpoint from the moment of its stamp.
-    pub fn follow(&mut self, setpoint: &Setpoint) {
-        self.advance(setpoint.stamp_ns);
-        let longest = self.now_ns + Self::LONGEST_APPROACH_NS;
-        self.target.reached_ns = setpoint.deadline_ns.clamp(self.now_ns, longest);
-        for j in 0..self.dof {
-            self.target.positions[j] = setpoint.positions[j];
-            self.target.velocities[j] = setpoint.velocities[j];
+        let efforts = velocities;
+        Self {
+            omega: Self::OMEGA,
+            speed_limits,
+            dof,
+            now_ns,
+            positions,
+            velocities,
+            efforts,
+            target,
         }
-    }
-
-    /// Stops by itself: brakes to where the arm is.
-    pub fn hold(&mut self) {
-        self.target = Target {
-            positions: self.positions,
-            velocities: JointVector::default(),
-            reached_ns: self.now_ns,
-        };
-    }
-
-    /// Brakes locked: the joints stand at once.
-    pub fn lock(&mut self) {
-        self.velocities = JointVector::default();
-        self.hold();
-    }
-
-    /// Moves on to a later time; an earlier one changes nothing.
-    pub fn advance(&mut self, to_ns: u64) {
-        if self.now_ns < self.target.reached_ns {
-            self.step(to_ns.min(self.target.reached_ns), true);
-        }
-        self.step(to_ns, false);
     }
 
     /// The exact solution of ë + 2ωė + ω²e = 0 for the distance e from a target that moves
@@ -116,6 +82,51 @@ impl Servo {
             self.velocities[j] = speed.clamp(-self.speed_limits[j], self.speed_limits[j]);
         }
         self.now_ns = to_ns;
+    }
+}
+
+impl Plant for Servo {
+    fn measured(&self) -> &JointVector {
+        &self.positions
+    }
+
+    fn velocities(&self) -> &JointVector {
+        &self.velocities
+    }
+
+    fn efforts(&self) -> &JointVector {
+        &self.efforts
+    }
+
+    fn follow(&mut self, setpoint: &Setpoint) {
+        self.advance(setpoint.stamp_ns);
+        let longest = self.now_ns + Self::LONGEST_APPROACH_NS;
+        self.target.reached_ns = setpoint.deadline_ns.clamp(self.now_ns, longest);
+        for j in 0..self.dof {
+            self.target.positions[j] = setpoint.positions[j];
+            self.target.velocities[j] = setpoint.velocities[j];
+        }
+    }
+
+    fn hold(&mut self) {
+        self.target = Target {
+            positions: self.positions,
+            velocities: JointVector::default(),
+            reached_ns: self.now_ns,
+        };
+    }
+
+    /// Brakes locked: the joints stand at once.
+    fn release(&mut self) {
+        self.velocities = JointVector::default();
+        self.hold();
+    }
+
+    fn advance(&mut self, to_ns: u64) {
+        if self.now_ns < self.target.reached_ns {
+            self.step(to_ns.min(self.target.reached_ns), true);
+        }
+        self.step(to_ns, false);
     }
 }
 
@@ -145,7 +156,7 @@ mod tests {
             servo.follow(&setpoint(k, &q, -1.0));
             if k % measure_every == 0 {
                 servo.advance((k + 1) * 1_000_000);
-                errors.push((servo.positions()[0] - q[0]).abs());
+                errors.push((servo.measured()[0] - q[0]).abs());
             }
         }
         errors
@@ -161,7 +172,7 @@ mod tests {
         assert!(worst < 1.0 / (std::f64::consts::E * Servo::OMEGA) + 1e-4, "corner {worst}");
         assert!(errors[199] < 1e-6, "no error remains at constant speed: {}", errors[199]);
         servo.advance(500_000_000);
-        assert!((servo.positions()[0] - (home[0] - 0.2)).abs() < 1e-9);
+        assert!((servo.measured()[0] - (home[0] - 0.2)).abs() < 1e-9);
         assert!(servo.velocities()[0].abs() < 1e-9);
     }
 
@@ -175,7 +186,7 @@ mod tests {
         for servo in [&mut steady, &mut stalled] {
             servo.advance(200_000_000);
         }
-        assert!((steady.positions()[0] - stalled.positions()[0]).abs() < 1e-9);
+        assert!((steady.measured()[0] - stalled.measured()[0]).abs() < 1e-9);
     }
 
     #[test]
@@ -189,9 +200,9 @@ mod tests {
         let mut last = home[0];
         for k in 1..100u64 {
             servo.advance(k * 1_000_000);
-            let step = (servo.positions()[0] - last).abs();
+            let step = (servo.measured()[0] - last).abs();
             assert!(step <= 2.088e-3 * 1.05 + 1e-12, "{step}");
-            last = servo.positions()[0];
+            last = servo.measured()[0];
         }
         assert!(last < home[0] - 0.15, "but it moves: {last}");
     }

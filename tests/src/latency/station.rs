@@ -33,7 +33,7 @@ pub(super) fn run(arm: &Arm, robot: &str, root: &Path, done: &AtomicBool) -> any
     let ipc = Ipc::open(robot, Some(root))?;
     let (setpoints, states) = (ipc.setpoint_receiver()?, ipc.state_sender()?);
     let start_ns = now_ns();
-    let mut endpoint = Endpoint::new(arm, arm.home(), Behaviour::default(), start_ns);
+    let mut endpoint = Endpoint::new(arm, arm.home(), Behaviour::default(), start_ns)?;
     let (mut transport, mut inter_arrival) = (Times::default(), Times::default());
     let (mut made_late, mut first) = (Times::default(), Vec::with_capacity(4096));
     let mut last: Option<(Setpoint, u64)> = None;
