@@ -61,6 +61,9 @@ pub struct Endpoint {
     disabled: bool,
     last: Option<Received>,
     frozen: Option<JointVector>,
+    jumped: bool,
+    /// What the last state said, the last finite one.
+    reported: JointVector,
     sequence: u64,
     deeds: Deeds,
 }
@@ -99,6 +102,8 @@ impl Endpoint {
             disabled: false,
             last: None,
             frozen: None,
+            jumped: false,
+            reported: initial,
             sequence: 0,
             deeds: Deeds::default(),
         })
@@ -128,11 +133,16 @@ impl Endpoint {
         self.timed_out
     }
 
+    /// Plays a fault from now on.
+    pub fn play(&mut self, kind: FaultKind, length: Option<Duration>, now_ns: u64) {
+        let start = Duration::from_nanos(now_ns.saturating_sub(self.started_ns));
+        self.behaviour.faults.push(FaultAt { kind, start, length });
+    }
+
     /// Judges and follows what one reading pass took out of the buffer, oldest first.
     pub fn receive(&mut self, pass: &[Setpoint], now_ns: u64) {
         if !pass.is_empty() {
-            let measured = *self.plant.measured();
-            self.judge.observe(pass, &measured);
+            self.judge.observe(pass, &self.reported);
         }
         for setpoint in pass {
             // The sender's stamps tell whether setpoints ceased, not when this process woke up.
@@ -141,6 +151,11 @@ impl Endpoint {
         }
         self.watch(now_ns);
         self.plant.advance(now_ns);
+        let jumped = self.is_active(FaultKind::Jump, now_ns);
+        if jumped != self.jumped {
+            self.plant.shift_encoder(0, if jumped { FaultKind::JUMP } else { -FaultKind::JUMP });
+            self.jumped = jumped;
+        }
         if self.is_active(FaultKind::Halt, now_ns) {
             self.plant.release();
             self.following = false;
@@ -164,9 +179,6 @@ impl Endpoint {
 
         let mut positions = *self.plant.measured();
         let mut velocities = *self.plant.velocities();
-        if active(FaultKind::Jump) {
-            positions[0] += 0.1;
-        }
         if active(FaultKind::Nan) {
             positions[0] = f64::NAN;
         }
@@ -180,6 +192,9 @@ impl Endpoint {
             self.frozen = None;
         }
 
+        if positions.iter().all(|q| q.is_finite()) {
+            self.reported = positions;
+        }
         let mut state = <JointStates as bytemuck::Zeroable>::zeroed();
         state.sequence = self.sequence;
         state.stamp_ns = stamp_ns;
@@ -356,9 +371,9 @@ mod tests {
         assert!(state_with("stale@5ms+5ms").0.is_some());
         let (state, rig) = state_with("nan@5ms");
         assert!(state.expect("sent").positions[0].is_nan() && rig.endpoint.positions()[0] < 10.0);
-        let (state, rig) = state_with("jump@5ms");
-        let off = state.expect("sent").positions[0] - rig.endpoint.positions()[0];
-        assert!((off - 0.1).abs() < 1e-12);
+        let (state, rig) = state_with("jump@18ms");
+        let off = state.expect("sent").positions[0] - (rig.home[0] + rig.moved);
+        assert!(off > 0.9 * FaultKind::JUMP, "{off}");
         assert_eq!(state_with("count@5ms").0.expect("sent").joint_count, 6);
         assert_eq!(state_with("delay@5ms").0.expect("sent").stamp_ns, 10 * MS);
         let (state, rig) = state_with("freeze@5ms");

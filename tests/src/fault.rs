@@ -22,7 +22,7 @@ pub enum FaultKind {
     Delay,
     /// The first joint's position is not a number.
     Nan,
-    /// The first joint's encoder is off by 0.1 rad.
+    /// The first joint's encoder is off by [`FaultKind::JUMP`].
     Jump,
     /// States report one joint too few.
     Count,
@@ -31,6 +31,9 @@ pub enum FaultKind {
 }
 
 impl FaultKind {
+    /// How far the encoder jumps: well beyond any following error. \[rad\]
+    pub const JUMP: f64 = 0.3;
+
     /// Every kind with its name on the command line.
     pub const NAMES: [(Self, &'static str); 11] = [
         (Self::Halt, "halt"),

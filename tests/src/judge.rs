@@ -236,8 +236,8 @@ impl Judge {
         &self.verdict
     }
 
-    /// Judges all setpoints of one reading pass, oldest first. `measured` is where the arm was
-    /// when the pass began.
+    /// Judges all setpoints of one reading pass, oldest first. `measured` is what the endpoint last
+    /// reported before it.
     pub fn observe(&mut self, pass: &[Setpoint], measured: &JointVector) {
         // With a buffer that overwrites its oldest sample, only a pass that found it full can have
         // lost any, and then in front of what it took.
@@ -274,7 +274,7 @@ impl Judge {
             self.verdict.sessions += 1;
             self.verdict.plans.push(PlanRun::new(s));
             self.check_start(s, &positions, measured);
-            self.check_limits(s, &positions, &JointVector::default(), &feed_forward);
+            self.check_limits(s, &positions, &JointVector::default(), &feed_forward, measured);
             return self.keep(s, mode, positions, JointVector::default());
         };
         if s.sequence <= last.seen {
@@ -302,12 +302,11 @@ impl Judge {
             std::array::from_fn(|j| (positions[j] - last.positions[j]) / elapsed);
         // When the executor leaves a fault, it begins again from where the arm was measured, and
         // gets there without a jump.
-        let idle = |mode| matches!(mode, Some(Mode::Init | Mode::Fault));
-        if idle(last.mode) && !idle(mode) {
+        if last.mode.is_some_and(is_idle) && !mode.is_some_and(is_idle) {
             self.check_start(s, &positions, measured);
         }
         let ratio = self.check_steps(s, &rates, elapsed);
-        self.check_limits(s, &positions, &rates, &feed_forward);
+        self.check_limits(s, &positions, &rates, &feed_forward, measured);
         self.follow_plan(s, &last, &rates, ratio);
         self.keep(s, mode, positions, rates);
     }
@@ -349,13 +348,22 @@ impl Judge {
         positions: &JointVector,
         rates: &JointVector,
         feed_forward: &JointVector,
+        measured: &JointVector,
     ) {
+        let idle = Mode::from_wire(s.mode).is_some_and(is_idle);
         for j in 0..self.arm.dof() {
             let limit = self.arm.limits()[j].velocity;
             if feed_forward[j].abs() > limit * (1.0 + self.rules.rounding) {
                 self.violate(Kind::Velocity, s, Some(j), feed_forward[j].abs(), limit);
             }
-            let (lower, upper) = self.arm.braking_limits(j, rates[j]);
+            let (lower, upper) = if idle {
+                // Where nothing is executed the setpoint follows the arm, which somebody may have
+                // pushed out of its limits.
+                let (lower, upper) = self.arm.braking_limits(j, 0.0);
+                (lower.min(measured[j]), upper.max(measured[j]))
+            } else {
+                self.arm.braking_limits(j, rates[j])
+            };
             let margin = (positions[j] - lower).min(upper - positions[j]);
             self.verdict.least_margin = self.verdict.least_margin.min(margin);
             if margin < -self.rules.rounding {
@@ -417,6 +425,11 @@ impl Judge {
             bound,
         });
     }
+}
+
+/// Whether the executor executes nothing and follows where the arm is.
+fn is_idle(mode: Mode) -> bool {
+    matches!(mode, Mode::Init | Mode::Fault)
 }
 
 impl PlanRun {

@@ -14,6 +14,7 @@ pub mod endpoint;
 pub mod fault;
 pub mod judge;
 pub mod latency;
+pub mod loopback;
 pub mod mechanism;
 pub mod mock;
 pub mod parts;

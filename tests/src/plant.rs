@@ -18,6 +18,8 @@ pub trait Plant: Send {
     fn hold(&mut self);
     /// Turns the motors off.
     fn release(&mut self);
+    /// The encoder of a joint jumps: from now on it is read so much further. \[rad\] or \[m\]
+    fn shift_encoder(&mut self, joint: usize, by: f64);
     /// Moves on to a later time; an earlier one changes nothing. \[ns\]
     fn advance(&mut self, to_ns: u64);
 }

@@ -1,0 +1,141 @@
+//! Every fault of the endpoint in every mode of the executor, under a virtual clock: what happens
+//! is listed, and is what the design asks for.
+
+use std::time::Duration;
+
+use nullsweep_executor::cycle::Order;
+use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanId};
+use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
+use nullsweep_tests::endpoint::{Behaviour, Fidelity};
+use nullsweep_tests::fault::FaultKind;
+use nullsweep_tests::loopback::Loopback;
+use nullsweep_tests::sketch::{Sketch, swung};
+
+/// How a fault must end where the arm was at rest, and where it moved. `None`: nothing happens.
+fn expected(kind: FaultKind) -> (Option<Fault>, Option<Fault>) {
+    let both = |fault| (Some(fault), Some(fault));
+    match kind {
+        FaultKind::Halt => both(Fault::Halted),
+        FaultKind::Error => both(Fault::Endpoint),
+        FaultKind::Uncalibrated => both(Fault::NotCalibrated),
+        FaultKind::Stale => both(Fault::CommunicationLost),
+        FaultKind::Nan => both(Fault::NotFinite),
+        FaultKind::Count => both(Fault::JointCount),
+        FaultKind::Jump => both(Fault::FollowingError),
+        // An arm that stands does not show that its encoders stand too.
+        FaultKind::Freeze | FaultKind::Deaf => (None, Some(Fault::FollowingError)),
+        FaultKind::Drop | FaultKind::Delay => (None, None),
+    }
+}
+
+fn right_arm() -> Arm {
+    Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("the PR2 has a right arm")
+}
+
+/// A system in a mode, and the plan that it has there.
+fn in_mode(mode: Mode, fidelity: Fidelity) -> (Loopback, Option<PlanId>) {
+    let arm = right_arm();
+    let behaviour = Behaviour { fidelity, ..Behaviour::default() };
+    let mut system = Loopback::new(&arm, behaviour).expect("a PR2 arm");
+    if mode == Mode::Init {
+        return (system, None);
+    }
+    system.run(10);
+    let mut plan = None;
+    if matches!(mode, Mode::Executing | Mode::Paused | Mode::Stopping) {
+        let sketch = Sketch::swings(&arm, &arm.home(), 4, 0.4, 0.3);
+        plan = Some(system.publish(&sketch).expect("a sound plan"));
+        system.run(300);
+    }
+    match mode {
+        Mode::Paused => {
+            system.order(Order::Pause);
+            system.run(500);
+        }
+        Mode::Stopping => {
+            system.order(Order::Stop);
+        }
+        Mode::Fault => {
+            let now = system.now_ns();
+            let short = Some(Duration::from_millis(50));
+            system.endpoint.play(FaultKind::Error, short, now);
+            system.run(200);
+        }
+        Mode::Init | Mode::Hold | Mode::Executing => {}
+    }
+    assert_eq!(system.snapshot().mode, mode);
+    (system, plan)
+}
+
+fn matrix(fidelity: Fidelity) {
+    println!("{:14} {:10} {:10} {:48} plan", "fault", "mode", "then", "fault code");
+    for (kind, name) in FaultKind::NAMES {
+        for &mode in Mode::ALL {
+            let (mut system, plan) = in_mode(mode, fidelity);
+            let now = system.now_ns();
+            system.endpoint.play(kind, Some(Duration::from_secs(2)), now);
+            system.run(1900);
+            let after = system.snapshot();
+            let story: Vec<_> = plan.map_or_else(Vec::new, |p| system.story(p));
+            let end = story.last().map_or("", |e| e.kind.text());
+            println!(
+                "{name:14} {:10} {:10} {:48} {end}",
+                mode.text(),
+                after.mode.text(),
+                after.fault.text()
+            );
+
+            let moves = mode == Mode::Executing;
+            let (at_rest, moving) = expected(kind);
+            match if moves { moving } else { at_rest } {
+                // While it waits, it does not start; while it is latched, it stays so.
+                Some(_) if mode == Mode::Init && kind != FaultKind::Jump => {
+                    assert_eq!(after.mode, Mode::Init, "{name}");
+                }
+                _ if mode == Mode::Fault => assert_eq!(after.mode, Mode::Fault, "{name}"),
+                Some(fault) => {
+                    assert_eq!((after.mode, after.fault), (Mode::Fault, fault), "{name}")
+                }
+                None => assert_ne!(after.mode, Mode::Fault, "{name} in {mode}: {}", after.fault),
+            }
+            assert!(matches!(story.len(), 0 | 2 | 3), "{name} in {mode}: {story:?}");
+
+            // Whatever happened: no violation at the endpoint, and a system that can be used again.
+            let verdict = system.endpoint.judge().verdict().clone();
+            assert_eq!(verdict.total(), 0, "{name} in {mode}: {:?}", verdict.first);
+            recovers(&mut system, name, mode);
+        }
+    }
+}
+
+/// Once the fault is over, the arm is reset and sweeps on.
+fn recovers(system: &mut Loopback, name: &str, mode: Mode) {
+    system.run(3000);
+    for order in [Order::Resume, Order::Stop, Order::Reset] {
+        system.order(order);
+        system.run(1500);
+    }
+    let after = system.snapshot();
+    assert_eq!(after.mode, Mode::Hold, "after {name} in {mode}: {}", after.fault);
+    let from = system.commanded();
+    let sketch = Sketch::through(&system.arm, &[from, swung(&system.arm, &from, 0.1), from], 0.1);
+    let plan = match system.publish(&sketch) {
+        Ok(plan) => plan,
+        Err(why) => panic!("after {name} in {mode}: {why}"),
+    };
+    system.run((sketch.seconds() * 1e3) as u32 + 1000);
+    let last = system.story(plan).last().copied().expect("events");
+    assert_eq!(last.kind, EventKind::Finished, "after {name} in {mode}: {last:?}");
+    let verdict = system.endpoint.judge().verdict();
+    assert_eq!(verdict.total(), 0, "after {name} in {mode}: {:?}", verdict.first);
+}
+
+#[test]
+fn every_fault_in_every_mode_with_a_servo() {
+    matrix(Fidelity::Servo);
+}
+
+#[test]
+fn every_fault_in_every_mode_with_a_mechanism() {
+    matrix(Fidelity::Mechanism);
+}
