@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bytemuck::Zeroable;
 use nullsweep_executor::cycle::{Ask, Event, Input, Measured, Order, Reply, Snapshot, State, step};
-use nullsweep_executor::{Guard, Held, JointGuard, Rejection, Rules, ValidPlan, admit};
+use nullsweep_executor::{Guard, Held, Rejection, Rules, ValidPlan, admit};
 use nullsweep_ipc_types::{JointStates, PlanHeader, PlanId, PlanMessage, Setpoint, checksum};
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
 
@@ -39,7 +39,7 @@ impl Loopback {
     pub fn new(arm: &Arm, behaviour: Behaviour) -> Result<Self, UnknownMechanism> {
         let start_ns = 1_000_000_000;
         let endpoint = Endpoint::new(arm, arm.home(), behaviour, start_ns)?;
-        let guard = guard(arm);
+        let guard = Guard::new(arm.limits());
         let rules = Rules {
             guard,
             fingerprint: arm.fingerprint(),
@@ -149,19 +149,4 @@ fn measured(state: &JointStates) -> Measured {
         q,
         status: state.status,
     }
-}
-
-fn guard(arm: &Arm) -> Guard {
-    let joints: Vec<JointGuard> = arm
-        .limits()
-        .iter()
-        .map(|l| JointGuard {
-            lower: l.lower,
-            upper: l.upper,
-            margin: l.k_position.map_or(0.0, f64::recip),
-            velocity: l.velocity,
-            continuous: l.continuous,
-        })
-        .collect();
-    Guard::new(&joints)
 }

@@ -19,6 +19,8 @@ pub struct Sketch {
 impl Sketch {
     /// Longest time between two knots. \[s\]
     const KNOT_DISTANCE: f64 = 0.05;
+    /// Postures nearer than this are the same. \[s\]
+    const SHORTEST: f64 = 1e-6;
 
     /// Straight lines through `postures` at `speed`, a share (0…1\] of the joints' velocity
     /// limits; the slowest joint of each line sets its time.
@@ -34,10 +36,10 @@ impl Sketch {
             let needed = (0..arm.dof())
                 .map(|j| (to[j] - from[j]).abs() / (speed * arm.limits()[j].velocity))
                 .fold(0.0, f64::max);
-            let pieces = (needed / Self::KNOT_DISTANCE).ceil() as u32;
-            if pieces == 0 {
+            if needed < Self::SHORTEST {
                 continue;
             }
+            let pieces = (needed / Self::KNOT_DISTANCE).ceil() as u32;
             // Rounded up, so that no joint is faster than asked for.
             let piece_ns = (needed / f64::from(pieces) * 1e9).ceil() as u64;
             if knots.is_empty() {

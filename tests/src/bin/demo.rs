@@ -3,6 +3,10 @@
 
 use std::process::ExitCode;
 
+/// This program is also an executor, whose real-time thread has a heap of its own.
+#[global_allocator]
+static ALLOCATOR: nullsweep_executor::PoolAllocator = nullsweep_executor::PoolAllocator::new();
+
 fn main() -> ExitCode {
     let args: Vec<_> = std::env::args_os().collect();
     nullsweep_tests::parts::play(&args).unwrap_or(ExitCode::SUCCESS)

@@ -2,6 +2,10 @@
 
 use std::process::ExitCode;
 
+/// This program is also an executor, whose real-time thread has a heap of its own.
+#[global_allocator]
+static ALLOCATOR: nullsweep_executor::PoolAllocator = nullsweep_executor::PoolAllocator::new();
+
 fn main() -> ExitCode {
     nullsweep_tests::latency::main(std::env::args_os())
 }

@@ -2,4 +2,8 @@
 //! its own. Nothing here asserts how fast anything is: these run on loaded machines too.
 
 mod common;
+mod kill;
 mod mock;
+mod reject;
+mod rig;
+mod run;
