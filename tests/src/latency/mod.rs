@@ -294,7 +294,7 @@ fn report(args: &Args, figures: &Figures) -> anyhow::Result<()> {
 
 fn table(figures: &Figures) -> String {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(presets::UTF8_BORDERS_ONLY);
     table.set_header(std::iter::once("µs").chain(Percentiles::HEADS));
     for row in &figures.rows {
         table.add_row(std::iter::once(row.what.to_owned()).chain(row.times.cells()));

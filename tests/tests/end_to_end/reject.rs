@@ -10,6 +10,9 @@ use nullsweep_tests::witness::PATIENCE;
 use crate::common::{right_arm, stage};
 use crate::rig::{Rig, describe};
 
+/// What makes a sound plan wrong.
+type Spoil<'a> = &'a dyn Fn(&mut Sketch);
+
 #[test]
 fn wrong_plans_are_rejected_and_the_running_one_goes_on() {
     let mut rig = Rig::start();
@@ -23,7 +26,7 @@ fn wrong_plans_are_rejected_and_the_running_one_goes_on() {
     let torso = rig.arm.held_joints().iter().position(|h| h.name == "torso_lift_joint");
     let torso = torso.expect("the torso is held");
 
-    let wrong: [(&str, Reason, &dyn Fn(&mut Sketch)); 11] = [
+    let wrong: [(&str, Reason, Spoil<'_>); 11] = [
         ("made for the left arm", Reason::Robot, &|s| s.header.fingerprint = left.fingerprint()),
         ("another joint count", Reason::Robot, &|s| s.header.joint_count = 6),
         ("another torso height", Reason::HeldJoint, &|s| s.header.held_positions[torso] += 0.1),
