@@ -21,6 +21,8 @@ pub mod rt;
 mod service;
 mod slots;
 #[cfg(test)]
+mod swaps;
+#[cfg(test)]
 mod testing;
 mod worker;
 

@@ -146,6 +146,8 @@ pub(crate) struct Sim {
     pub speaks: bool,
     pub events: Vec<Event>,
     pub lives: HashMap<PlanId, Life>,
+    /// How many events of each kind.
+    pub tally: [u64; 6],
     pub last: Option<Joints>,
     pub last_v: Joints,
     /// Greatest change of commanded velocity, as an acceleration. \[rad/s²\]
@@ -165,6 +167,7 @@ impl Sim {
             speaks: true,
             events: Vec::new(),
             lives: HashMap::new(),
+            tally: [0; 6],
             last: None,
             last_v: [0.0; MAX_DOF],
             top_acceleration: 0.0,
@@ -249,6 +252,7 @@ impl Sim {
 
     fn judge(&mut self, out: &Output) {
         for event in &out.events {
+            self.tally[event.kind as usize] += 1;
             let life = self.lives.entry(event.plan).or_default();
             match event.kind {
                 EventKind::Accepted => life.accepted += 1,

@@ -347,3 +347,6 @@ fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
 fn small(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(u32::MAX)
 }
+
+#[cfg(test)]
+mod tests;
