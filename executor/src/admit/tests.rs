@@ -21,8 +21,11 @@ fn judge(header: &PlanHeader, knots: &[Knot], held: Option<&Held>) -> Result<Val
     admit(header, knots, held, &rules(&pr2()), NOW)
 }
 
-/// What is changed, the reason, the joint, the knot; sealed again after the change.
-const SEALED: &[(&str, Edit, Reason, Option<u32>, Option<u32>)] = &[
+/// What is changed, the reason, the joint, the knot.
+type Case = (&'static str, Edit, Reason, Option<u32>, Option<u32>);
+
+/// Sealed again after the change.
+const SEALED: &[Case] = &[
     (
         "one knot",
         |h, k| {
