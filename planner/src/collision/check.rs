@@ -1,0 +1,212 @@
+//! The fast check: bounds first, exact distances where they do not suffice.
+
+use super::ToolContact;
+use super::bodies::MAX_BODIES;
+use super::frame::Frame;
+use super::motion::Slack;
+use super::solid::Solid;
+use super::world::{Fixed, Moving, World};
+use crate::collision::Hit;
+use nalgebra::Vector3;
+use nullsweep_robot::JointVector;
+use parry3d_f64::query::{DefaultQueryDispatcher, QueryDispatcher};
+use parry3d_f64::shape::SharedShape;
+
+/// What the fast check asks for beyond every margin, so that its rounding never makes it pass what
+/// the exact check rejects. \[m\]
+pub(crate) const TOLERANCE: f64 = 1e-8;
+
+/// Spheres looked at before a pair of shapes goes to GJK, which costs about as much.
+const SPHERES: usize = 24;
+
+impl World {
+    /// Whether everything that moves with the arm keeps its margins. NaN and ∞ are not free.
+    #[must_use]
+    pub fn is_free(&self, q: &JointVector, contact: ToolContact) -> bool {
+        self.is_clear(q, contact, &Slack::NONE)
+    }
+
+    /// The first pair too near, for messages; from the exact check, so it is slow.
+    #[must_use]
+    pub fn why_not(&self, q: &JointVector, contact: ToolContact) -> Option<Hit> {
+        self.exact().first_hit(q, contact)
+    }
+
+    /// Whether all margins hold with the slack of each body added.
+    pub(crate) fn is_clear(&self, q: &JointVector, contact: ToolContact, slack: &Slack) -> bool {
+        let inside = |(value, travel): (&f64, &f64)| value.is_finite() && value.abs() <= *travel;
+        if !q.iter().zip(&self.travel).all(inside) {
+            return false;
+        }
+        let poses = self.bodies.poses(q);
+        self.moving.iter().rev().all(|shape| {
+            let need = slack.body[shape.body] + TOLERANCE;
+            self.is_clear_of_scan(shape, &poses[shape.body], contact, need)
+                && self.is_clear_of_fixed(shape, &poses[shape.body], need)
+        }) && self.are_pairs_clear(&poses, slack)
+    }
+
+    fn is_clear_of_scan(
+        &self,
+        shape: &Moving,
+        pose: &Frame,
+        contact: ToolContact,
+        slack: f64,
+    ) -> bool {
+        let touch = match contact {
+            ToolContact::Allowed => shape.touch.as_ref(),
+            ToolContact::Forbidden => None,
+        };
+        let margin = match touch {
+            // The pad is clear if no point is where its keep-out boxes are.
+            Some(touch) if touch.depth == f64::INFINITY => {
+                return touch.tree.all(
+                    |s| self.field.is_farther(&pose.apply(&s.centre), s.radius + slack),
+                    |s| {
+                        let reach = s.radius + slack;
+                        self.field.all_within(&pose.apply(&s.centre), reach, |p| {
+                            self.point_value(shape, pose, contact, p, slack) >= slack
+                        })
+                    },
+                );
+            }
+            Some(touch) => touch.margin,
+            None => self.margins.environment,
+        };
+        let need = margin + slack;
+        shape.tree.all(
+            |s| self.field.is_farther(&pose.apply(&s.centre), s.radius + need),
+            |s| {
+                self.field.all_within(&pose.apply(&s.centre), s.radius + need, |p| {
+                    self.point_value(shape, pose, contact, p, slack) >= slack
+                })
+            },
+        )
+    }
+
+    /// A lower bound of how far the shape can move, relative to the scan point `p` (root frame),
+    /// before the point breaks the rules; negative if it does now. Not looked at more closely than
+    /// to tell whether it is at least `enough`. \[m\]
+    pub(crate) fn point_value(
+        &self,
+        shape: &Moving,
+        pose: &Frame,
+        contact: ToolContact,
+        p: &Vector3<f64>,
+        enough: f64,
+    ) -> f64 {
+        let in_body = pose.apply_inverse(p);
+        let local = shape.place.apply_inverse(&in_body);
+        let (Some(touch), ToolContact::Allowed) = (&shape.touch, contact) else {
+            let margin = self.margins.environment;
+            return distance_for(&shape.solid, &local, margin + enough) - margin;
+        };
+        let distance = distance_for(&shape.solid, &local, touch.margin + enough);
+        let free = distance - touch.margin;
+        if free >= enough {
+            return free;
+        }
+        let at = self.contact.frame.apply_inverse(&in_body);
+        let in_prism = (0..3).all(|i| at[i] >= self.contact.min[i] && at[i] <= self.contact.max[i]);
+        if !in_prism && free < 0.0 {
+            return free;
+        }
+        // What is left is to stay out of the keep-out boxes and not too deep in the shape.
+        touch
+            .keep_out
+            .iter()
+            .map(|(min, max)| box_distance(min, max, &at))
+            .fold(distance + touch.depth, f64::min)
+            .max(free)
+    }
+
+    fn is_clear_of_fixed(&self, shape: &Moving, pose: &Frame, slack: f64) -> bool {
+        let root = shape.tree.root();
+        let centre = pose.apply(&root.centre);
+        shape.against.iter().all(|&index| {
+            let fixed = &self.fixed[index];
+            let need = fixed.margin + slack;
+            let reach = root.radius + need;
+            fixed.box_distance_squared(&centre) >= reach * reach
+                || is_pair_clear(
+                    shape,
+                    &fixed.place.inverse_then(pose),
+                    &fixed.solid,
+                    &Frame::IDENTITY,
+                    &fixed.shape,
+                    need,
+                )
+        })
+    }
+
+    fn are_pairs_clear(&self, poses: &[Frame; MAX_BODIES], slack: &Slack) -> bool {
+        let mut centres = [Vector3::zeros(); 64];
+        let count = self.moving.len().min(centres.len());
+        for (centre, shape) in centres.iter_mut().zip(&self.moving) {
+            *centre = poses[shape.body].apply(&shape.tree.root().centre);
+        }
+        self.pairs.iter().all(|&(a, b)| {
+            let (first, second) = (&self.moving[a], &self.moving[b]);
+            let (ra, rb) = (first.tree.root().radius, second.tree.root().radius);
+            let need =
+                self.margins.self_clearance + slack.between(first.body, second.body) + TOLERANCE;
+            let reach = ra + rb + need;
+            if a < count && b < count && (centres[a] - centres[b]).norm_squared() >= reach * reach {
+                return true;
+            }
+            // The spheres of the smaller shape against the solid of the larger.
+            let (small, large) = if ra <= rb { (first, second) } else { (second, first) };
+            let relative = poses[large.body].inverse_then(&poses[small.body]);
+            is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
+        })
+    }
+}
+
+impl Fixed {
+    /// Squared distance from a point of the root frame to the axis-aligned bounds. \[m²\]
+    #[inline]
+    pub(crate) fn box_distance_squared(&self, p: &Vector3<f64>) -> f64 {
+        let outside = |i: usize| (self.min[i] - p[i]).max(p[i] - self.max[i]).max(0.0);
+        let (x, y, z) = (outside(0), outside(1), outside(2));
+        x * x + y * y + z * z
+    }
+}
+
+/// Whether `shape`, its body at `relative` in some frame, is at least `need` from the solid that
+/// stands at `place` in that frame.
+fn is_pair_clear(
+    shape: &Moving,
+    relative: &Frame,
+    solid: &Solid,
+    place: &Frame,
+    other: &SharedShape,
+    need: f64,
+) -> bool {
+    let local = place.inverse_then(relative);
+    let mut seen = 0;
+    shape.tree.all(
+        |s| {
+            seen += 1;
+            seen <= SPHERES && solid.distance_bound(&local.apply(&s.centre)) >= s.radius + need
+        },
+        |_| false,
+    ) || gjk_distance(&local.then(&shape.place), other, &shape.shape) >= need
+}
+
+/// Distance between two shapes, the second at `pose` in the first's frame; 0 if they overlap. \[m\]
+pub(crate) fn gjk_distance(pose: &Frame, first: &SharedShape, second: &SharedShape) -> f64 {
+    DefaultQueryDispatcher
+        .distance(&pose.to_parry(), &**first, &**second)
+        .map_or(0.0, |found| found.distance)
+}
+
+/// The signed distance, but only a lower bound of it where that already is `enough`. \[m\]
+fn distance_for(solid: &Solid, p: &Vector3<f64>, enough: f64) -> f64 {
+    let bound = solid.distance_bound(p);
+    if bound >= enough { bound } else { solid.distance(p) }
+}
+
+/// Distance from `p` to a box, 0 inside. \[m\]
+fn box_distance(min: &Vector3<f64>, max: &Vector3<f64>, p: &Vector3<f64>) -> f64 {
+    (min - p).sup(&(p - max)).map(|x| x.max(0.0)).norm()
+}

@@ -1,0 +1,290 @@
+//! The scan as an obstacle: a two-level grid of distances in front of the raw points.
+//!
+//! Both levels hold the distance of the grid's nodes to the nearest raw point, so the bound at any
+//! place is the node's distance less the way to the node: never more than the true distance. What
+//! the grid cannot prove is decided on the raw points, kept in cells.
+
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nalgebra::{Point3, Vector3};
+
+/// The points that the moving links can reach, in the root frame.
+#[derive(Debug, Default)]
+pub(crate) struct Field {
+    points: Vec<Vector3<f64>>,
+    coarse: Grid,
+    fine: Grid,
+    /// Nodes of the fine grid without a point this near hold this value. \[m\]
+    fine_cap: f64,
+    /// First point of each fine-grid cell (nodes are the cells' centres); one more at the end.
+    starts: Vec<u32>,
+}
+
+/// Nodes of a regular grid and their distances.
+#[derive(Debug, Default)]
+struct Grid {
+    origin: Vector3<f64>,
+    spacing: f64,
+    inverse: f64,
+    size: [usize; 3],
+    /// Lower bounds of the distance to the nearest point, x fastest. \[m\]
+    distance: Vec<f32>,
+}
+
+/// Wanted spacing of the fine nodes; grows with the scan's volume. \[m\]
+const FINE: f64 = 0.01;
+/// The fine band reaches this many nodes from a point.
+const BAND: usize = 4;
+/// Most nodes of the fine grid.
+const FINE_NODES: f64 = 3.0e6;
+/// Coarse nodes stand this many fine spacings apart, and this far beyond the points.
+const COARSE_STEP: f64 = 6.0;
+/// How far the coarse grid reaches beyond the points. \[m\]
+const COARSE_BORDER: f64 = 0.4;
+/// Covers the rounding of stored f32 distances below 10 m. \[m\]
+const ROUNDING: f64 = 2e-6;
+
+impl Field {
+    /// Keeps the finite points within `reach` of `centre` (what lies beyond can never be touched).
+    pub(crate) fn new(scan: &[Point3<f64>], centre: &Vector3<f64>, reach: f64) -> Self {
+        let mut points: Vec<Vector3<f64>> =
+            scan.iter().map(|p| p.coords).filter(|p| (p - centre).norm() <= reach).collect();
+        if points.is_empty() {
+            return Self::default();
+        }
+        let (mut min, mut max) = (points[0], points[0]);
+        for p in &points {
+            min = min.inf(p);
+            max = max.sup(p);
+        }
+        let extent = max - min;
+        let spaced = |h: f64| {
+            let border = 2.0 * (BAND as f64 + 1.0) * h;
+            (extent.x + border) * (extent.y + border) * (extent.z + border) / (h * h * h)
+        };
+        let mut h = FINE;
+        while spaced(h) > FINE_NODES {
+            h *= 1.1;
+        }
+        let mut fine = Grid::new(min, max, h, (BAND + 1) as f64 * h);
+        let starts = sort_into_cells(&fine, &mut points);
+        let fine_cap = (BAND as f64 + 0.5) * h;
+        fine.scatter(&points, fine_cap);
+        let coarse = Grid::coarse(min, max, h, &points);
+        Self { points, coarse, fine, fine_cap, starts }
+    }
+
+    /// The points kept.
+    pub(crate) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether every point is proven to be at least `need` away from `p` \[m\].
+    #[inline]
+    pub(crate) fn is_farther(&self, p: &Vector3<f64>, need: f64) -> bool {
+        self.points.is_empty()
+            || self.coarse.bound(p) >= need
+            || (need < self.fine_cap && self.fine.bound(p) >= need)
+    }
+
+    /// A lower bound of the distance from `p` to the nearest point \[m\], 0 if unknown.
+    #[inline]
+    pub(crate) fn bound(&self, p: &Vector3<f64>) -> f64 {
+        if self.points.is_empty() {
+            return f64::INFINITY;
+        }
+        self.coarse.bound(p).max(self.fine.bound(p)).max(0.0)
+    }
+
+    /// Calls `test` on every point within `radius` of `p`, until it is false; whether it never was.
+    #[inline]
+    pub(crate) fn all_within(
+        &self,
+        p: &Vector3<f64>,
+        radius: f64,
+        mut test: impl FnMut(&Vector3<f64>) -> bool,
+    ) -> bool {
+        if self.points.is_empty() {
+            return true;
+        }
+        let grid = &self.fine;
+        let low = grid.clamped_cell(&(p - Vector3::repeat(radius)));
+        let high = grid.clamped_cell(&(p + Vector3::repeat(radius)));
+        let squared = radius * radius;
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
+                let row = (z * grid.size[1] + y) * grid.size[0];
+                // Cells of one row follow each other, so their points are one slice.
+                let from = self.starts[row + low[0]] as usize;
+                let to = self.starts[row + high[0] + 1] as usize;
+                for point in &self.points[from..to] {
+                    if (point - p).norm_squared() <= squared && !test(point) {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+}
+
+impl Grid {
+    /// A grid over the box grown by `border`, distances still infinite.
+    fn new(min: Vector3<f64>, max: Vector3<f64>, spacing: f64, border: f64) -> Self {
+        let origin = min - Vector3::repeat(border);
+        let count = |i: usize| ((max[i] - min[i] + 2.0 * border) / spacing).ceil() as usize + 1;
+        let size = [count(0), count(1), count(2)];
+        Self {
+            origin,
+            spacing,
+            inverse: 1.0 / spacing,
+            size,
+            distance: vec![f32::INFINITY; size[0] * size[1] * size[2]],
+        }
+    }
+
+    /// The grid for the far field: the distance from every node to its nearest point.
+    fn coarse(min: Vector3<f64>, max: Vector3<f64>, fine: f64, points: &[Vector3<f64>]) -> Self {
+        let mut grid = Self::new(min, max, COARSE_STEP * fine, COARSE_BORDER);
+        let entries: Vec<[f64; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
+        let tree: ImmutableKdTree<f64, 3> =
+            ImmutableKdTree::new_from_slice(&entries).expect("finite points make a tree");
+        for z in 0..grid.size[2] {
+            for y in 0..grid.size[1] {
+                for x in 0..grid.size[0] {
+                    let node = grid.node(x, y, z);
+                    let nearest = tree
+                        .query(&[node.x, node.y, node.z])
+                        .nearest_one::<SquaredEuclidean<f64>>()
+                        .execute();
+                    let index = (z * grid.size[1] + y) * grid.size[0] + x;
+                    grid.distance[index] = (nearest.distance.sqrt() - ROUNDING) as f32;
+                }
+            }
+        }
+        grid
+    }
+
+    /// Distances to the nearest point, as far as `cap`.
+    fn scatter(&mut self, points: &[Vector3<f64>], cap: f64) {
+        let (h, band) = (self.spacing as f32, BAND as isize);
+        for p in points {
+            let cell = self.clamped_cell(p);
+            let offset = (p - self.node(cell[0], cell[1], cell[2])).map(|x| x as f32);
+            for dz in -band..=band {
+                let z = (cell[2] as isize + dz) as usize;
+                let from_z = dz as f32 * h - offset.z;
+                for dy in -band..=band {
+                    let y = (cell[1] as isize + dy) as usize;
+                    let from_y = dy as f32 * h - offset.y;
+                    let flat = from_z * from_z + from_y * from_y;
+                    let first = (z * self.size[1] + y) * self.size[0] + cell[0] - BAND;
+                    let row = &mut self.distance[first..=first + 2 * BAND];
+                    for (dx, squared) in row.iter_mut().enumerate() {
+                        let from_x = (dx as isize - band) as f32 * h - offset.x;
+                        *squared = squared.min(flat + from_x * from_x);
+                    }
+                }
+            }
+        }
+        // A point reaches all nodes within BAND of its own, from which it is half a spacing off at
+        // most; what none has reached is farther than the cap.
+        let cap = cap as f32;
+        for d in &mut self.distance {
+            *d = d.sqrt().min(cap) - ROUNDING as f32;
+        }
+    }
+
+    fn node(&self, x: usize, y: usize, z: usize) -> Vector3<f64> {
+        self.origin + self.spacing * Vector3::new(x as f64, y as f64, z as f64)
+    }
+
+    /// The nearest node's indices, clamped to the grid.
+    #[inline]
+    fn clamped_cell(&self, p: &Vector3<f64>) -> [usize; 3] {
+        let at = (p - self.origin) * self.inverse;
+        // The cast saturates: below 0 (and NaN) becomes 0.
+        let index = |i: usize| ((at[i] + 0.5) as usize).min(self.size[i] - 1);
+        [index(0), index(1), index(2)]
+    }
+
+    /// A lower bound of the distance from `p` to any point: may be negative. \[m\]
+    #[inline]
+    fn bound(&self, p: &Vector3<f64>) -> f64 {
+        let [x, y, z] = self.clamped_cell(p);
+        let distance = self.distance[(z * self.size[1] + y) * self.size[0] + x];
+        f64::from(distance) - (p - self.node(x, y, z)).norm()
+    }
+}
+
+/// Sorts the points by the grid's cells; returns where each cell's points start.
+fn sort_into_cells(grid: &Grid, points: &mut Vec<Vector3<f64>>) -> Vec<u32> {
+    let cell_of = |p: &Vector3<f64>| {
+        let [x, y, z] = grid.clamped_cell(p);
+        (z * grid.size[1] + y) * grid.size[0] + x
+    };
+    let cells: Vec<usize> = points.iter().map(cell_of).collect();
+    let mut starts = vec![0u32; grid.distance.len() + 1];
+    for &cell in &cells {
+        starts[cell + 1] += 1;
+    }
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let mut next = starts.clone();
+    let mut sorted = vec![Vector3::zeros(); points.len()];
+    for (p, &cell) in points.iter().zip(&cells) {
+        sorted[next[cell] as usize] = *p;
+        next[cell] += 1;
+    }
+    *points = sorted;
+    starts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn bounds_never_exceed_the_true_distance_and_are_near_it() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let scan: Vec<Point3<f64>> = (0..3000)
+            .map(|_| {
+                let (u, v): (f64, f64) = (rng.random_range(-0.4..0.4), rng.random_range(-0.3..0.3));
+                Point3::new(0.8 + 0.2 * u * u, u, 0.9 + v)
+            })
+            .collect();
+        let field = Field::new(&scan, &Vector3::zeros(), 10.0);
+        assert_eq!(field.len(), scan.len());
+        let mut loosest = 0.0f64;
+        for _ in 0..20_000 {
+            let p = Vector3::new(
+                rng.random_range(-0.5..2.0),
+                rng.random_range(-1.2..1.2),
+                rng.random_range(-0.2..2.0),
+            );
+            let truth = scan.iter().map(|q| (q.coords - p).norm()).fold(f64::MAX, f64::min);
+            let bound = field.bound(&p);
+            assert!(bound <= truth, "bound {bound} > distance {truth} at {p}");
+            assert!(!field.is_farther(&p, truth + 1e-6));
+            if truth < 0.02 {
+                loosest = loosest.max(truth - bound);
+            }
+            let mut within = 0;
+            field.all_within(&p, 0.1, |_| {
+                within += 1;
+                true
+            });
+            assert_eq!(within, scan.iter().filter(|q| (q.coords - p).norm() <= 0.1).count());
+        }
+        assert!(loosest < 2.0 * 0.01, "near the surface the bound is {loosest} m too low");
+    }
+
+    #[test]
+    fn points_out_of_reach_are_dropped() {
+        let scan = [Point3::new(1.0, 0.0, 0.0), Point3::new(5.0, 0.0, 0.0)];
+        assert_eq!(Field::new(&scan, &Vector3::zeros(), 2.0).len(), 1);
+        assert!(Field::new(&scan[1..], &Vector3::zeros(), 2.0).is_farther(&Vector3::zeros(), 9.0));
+    }
+}
