@@ -12,6 +12,7 @@ use std::time::Duration;
 use anyhow::Context;
 use clap::Parser;
 use comfy_table::{Table, presets};
+use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::service;
 use serde::Serialize;
@@ -50,6 +51,9 @@ struct Args {
     /// Stop by itself so long after the last setpoint's deadline, in ms
     #[arg(long, default_value_t = 20, value_name = "MS")]
     timeout: u64,
+    /// SCHED_FIFO priority of the mock's loop, where permitted; 0 for the default scheduler
+    #[arg(long, default_value_t = 70, value_parser = clap::value_parser!(u8).range(0..=99))]
+    priority: u8,
     /// Write the measured and commanded joints as CSV
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -122,6 +126,8 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
 
     let mut pass = Vec::with_capacity(2 * service::SETPOINT.buffer);
     let mut newest = None;
+    // Where it is denied the mock is only later now and then, and says how often.
+    let _ = become_real_time(args.priority, None);
     let mut grid = Grid::new(PERIOD_NS);
     let mut own_late_cycles = 0;
     let mut now = start_ns;
@@ -203,6 +209,7 @@ fn table(outcome: &Outcome) -> String {
         "made late by the sender",
         format!("{}, at most {:.1} ms", verdict.late, verdict.worst_lateness_ns as f64 * 1e-6),
     );
+    row("own late cycles", outcome.own_late_cycles.to_string());
     row("stopped by itself", format!("{} times", outcome.endpoint.timeouts));
     row("refused setpoints", outcome.endpoint.refused.to_string());
     for run in verdict.plans.iter().filter(|run| run.plan != "0/0") {

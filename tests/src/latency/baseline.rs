@@ -6,6 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use bytemuck::Zeroable;
+use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::Setpoint;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 
@@ -14,10 +15,22 @@ use crate::clock::Grid;
 
 const PERIOD_NS: u64 = 1_000_000;
 
-/// Wake-up lateness of a bare loop that sleeps to each deadline of a 1 kHz grid. A stall counts
-/// for every deadline that it passes, each with its own lateness.
+/// Wake-up lateness of a bare loop that sleeps to each deadline of a 1 kHz grid, in a thread with
+/// the executor's own priority. A stall counts for every deadline that it passes, each with its
+/// own lateness.
 #[must_use]
-pub(super) fn sleep_loop(time: Duration) -> Times {
+pub(super) fn sleep_loop(time: Duration, priority: u8) -> Times {
+    thread::scope(|scope| {
+        let loop_ = scope.spawn(|| {
+            // What is denied here is denied to the executor too, which says so.
+            let _ = become_real_time(priority, None);
+            bare_loop(time)
+        });
+        loop_.join().unwrap_or_default()
+    })
+}
+
+fn bare_loop(time: Duration) -> Times {
     let mut times = Times::default();
     let mut grid = Grid::new(PERIOD_NS);
     let end_ns = now_ns() + time.as_nanos() as u64;
@@ -34,7 +47,7 @@ pub(super) fn sleep_loop(time: Duration) -> Times {
 
 /// One way from a thread that sends a setpoint each millisecond to one that polls for it, with
 /// nothing else done.
-pub(super) fn ping(root: &Path, time: Duration) -> anyhow::Result<Times> {
+pub(super) fn ping(root: &Path, time: Duration, priority: u8) -> anyhow::Result<Times> {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
         let receiving = scope.spawn(|| -> anyhow::Result<Times> {
@@ -48,10 +61,15 @@ pub(super) fn ping(root: &Path, time: Duration) -> anyhow::Result<Times> {
             }
             Ok(times)
         });
-        let sent = send(root, time);
+        let sending = scope.spawn(|| {
+            let _ = become_real_time(priority, None);
+            send(root, time)
+        });
+        let sent = sending.join();
         done.store(true, Ordering::Relaxed);
-        let times = receiving.join().map_err(|_| anyhow::anyhow!("the receiving thread died"))?;
-        sent.and(times)
+        let died = |_| anyhow::anyhow!("a thread of the ping died");
+        let times = receiving.join().map_err(died)?;
+        sent.map_err(died)?.and(times)
     })
 }
 
@@ -75,10 +93,10 @@ mod tests {
 
     #[test]
     fn the_yardsticks_measure_something() {
-        let times = sleep_loop(Duration::from_millis(50)).percentiles();
+        let times = sleep_loop(Duration::from_millis(50), 0).percentiles();
         assert!(times.count >= 50 && times.max_ns > 0, "{times:?}");
         let folder = tempfile::TempDir::new().expect("a folder");
-        let times = ping(folder.path(), Duration::from_millis(100)).expect("both ends open");
+        let times = ping(folder.path(), Duration::from_millis(100), 0).expect("both ends open");
         assert!(times.percentiles().count > 0);
     }
 }

@@ -54,6 +54,9 @@ struct Args {
     /// Knots of each plan that is published
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(3..=16384))]
     knots: u32,
+    /// SCHED_FIFO priority of executor and yardsticks; 0 for the default scheduler
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    priority: u8,
     /// Seed of the moments at which plans are published
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -148,8 +151,8 @@ fn run(args: &Args) -> anyhow::Result<Figures> {
     for round in 1..=args.rounds {
         eprintln!("latency: round {round} of {}: yardsticks", args.rounds);
         let stage = Stage::new(std::env::current_exe()?, "pr2")?;
-        sums.sleep.merge(&baseline::sleep_loop(share / 2));
-        sums.ping.merge(&baseline::ping(&stage.root(), share / 2)?);
+        sums.sleep.merge(&baseline::sleep_loop(share / 2, args.priority));
+        sums.ping.merge(&baseline::ping(&stage.root(), share / 2, args.priority)?);
         eprintln!("latency: round {round} of {}: executor", args.rounds);
         measure(args, &arm, &stage, share, &mut random, &mut sums)?;
     }
@@ -169,6 +172,7 @@ fn measure(
 ) -> anyhow::Result<()> {
     let mut options: Vec<OsString> = vec!["run".into()];
     options.extend(stage.place());
+    options.extend(["--priority".into(), args.priority.to_string().into()]);
     options.extend(args.executor.iter().cloned());
     let mut executor = stage.start(Part::Executor, "executor", options)?;
     let (root, done) = (stage.root(), AtomicBool::new(false));
