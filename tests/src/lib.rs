@@ -6,13 +6,15 @@
 //! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all.
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
 //! * [`witness`]: watches an executor from outside.
-//! * [`latency`]: the latency lab.
+//! * [`latency`]: the latency lab; [`kills`]: the killing lab; [`loopback`]: executor and endpoint
+//!   under a virtual clock.
 
 pub mod arm_args;
 pub mod clock;
 pub mod endpoint;
 pub mod fault;
 pub mod judge;
+pub mod kills;
 pub mod latency;
 pub mod loopback;
 pub mod mechanism;

@@ -7,11 +7,15 @@ use std::time::Duration;
 
 use clap::Parser;
 use nullsweep_ipc_types::ports::Ipc;
-use nullsweep_ipc_types::{EventKind, Reason};
+use nullsweep_ipc_types::{EventKind, Mode, Reason};
+use nullsweep_robot::{JointVector, MAX_DOF};
 
 use crate::arm_args::ArmArgs;
 use crate::sketch::Sketch;
 use crate::witness::Witness;
+
+/// Nearer than this the arm is at home. \[rad\]
+const AT_HOME: f64 = 1e-3;
 
 /// Publishes swings of every joint from the arm's home and back.
 #[derive(Debug, Parser)]
@@ -28,6 +32,9 @@ struct Args {
     /// Share of the velocity limits
     #[arg(long, default_value_t = 0.3)]
     speed: f64,
+    /// Instead of swinging, go home from where the arm is commanded
+    #[arg(long)]
+    home: bool,
     /// Stay alive after the plan was accepted, instead of waiting for its end
     #[arg(long)]
     stay: bool,
@@ -52,9 +59,20 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// Whether the plan was executed to its end.
 fn run(args: &Args) -> anyhow::Result<bool> {
     let arm = args.arm.load()?;
-    let sketch = Sketch::swings(&arm, &arm.home(), args.swings, args.angle, args.speed);
     let ipc = Ipc::open(&args.arm.robot_name, args.arm.ipc_root.as_deref())?;
     let mut witness = Witness::open(&ipc)?;
+    let sketch = if args.home {
+        let held = witness.mode(Mode::Hold)?;
+        let mut from = JointVector::default();
+        from.copy_from_slice(&held.commanded[..MAX_DOF]);
+        if (0..arm.dof()).all(|j| (from[j] - arm.home()[j]).abs() < AT_HOME) {
+            println!("at home");
+            return Ok(true);
+        }
+        Sketch::through(&arm, &[from, arm.home()], args.speed)
+    } else {
+        Sketch::swings(&arm, &arm.home(), args.swings, args.angle, args.speed)
+    };
     let mut publisher = ipc.plan_publisher(sketch.knots.len())?;
     let plan = publisher.publish(&sketch.header, &sketch.knots)?;
     println!("published {plan}");

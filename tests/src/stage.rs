@@ -89,6 +89,18 @@ impl Stage {
         self.folder.path().join(name)
     }
 
+    /// Copies the files of this stage (plans, figures, the processes' output) to a folder.
+    pub fn copy_files(&self, to: &Path) -> io::Result<()> {
+        fs::create_dir_all(to)?;
+        for entry in fs::read_dir(self.folder.path())? {
+            let entry = entry?;
+            if entry.file_type()?.is_file() {
+                fs::copy(entry.path(), to.join(entry.file_name()))?;
+            }
+        }
+        Ok(())
+    }
+
     /// The options that every part takes: where its services are.
     #[must_use]
     pub fn place(&self) -> [OsString; 4] {
