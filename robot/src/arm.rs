@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, SMatrix};
 use crate::chain::{Chain, Step, about};
 use crate::fingerprint::fingerprint;
 use crate::ik::{InverseKinematics, RedundantJoint, Solvers};
-use crate::limits::JointLimits;
+use crate::limits::{JointLimits, LimitsError, apply_toml};
 use crate::urdf::{Joint, JointKind, Model, Robot};
 use crate::{JointVector, MAX_DOF, pr2};
 
@@ -237,18 +237,25 @@ impl Arm {
             }
             slot.position = position;
         }
-        let active: Vec<usize> = self
-            .names
-            .iter()
-            .filter_map(|name| self.model.joints.iter().position(|j| j.name == *name))
-            .collect();
-        Ok(Self::assemble(
-            self.model.clone(),
-            self.spec.clone(),
-            &active,
-            self.limits.clone(),
-            held,
-        ))
+        Ok(self.changed(self.limits.clone(), held))
+    }
+
+    /// The same arm with limits from a file: one table a joint with `velocity` (at most the
+    /// URDF's), `acceleration`, or both.
+    ///
+    /// ```toml
+    /// [r_wrist_flex_joint]
+    /// velocity = 2.0       # rad/s
+    /// acceleration = 10.0  # rad/s²
+    /// ```
+    ///
+    /// # Errors
+    /// When the text is not such a file, names a joint that the arm does not move, or holds a
+    /// value out of range.
+    pub fn with_limits_toml(&self, text: &str) -> Result<Self, LimitsError> {
+        let mut limits = self.limits.clone();
+        apply_toml(text, &self.names, &mut limits)?;
+        Ok(self.changed(limits, self.held.clone()))
     }
 
     /// 64 bits that name the robot's kinematics and this arm, whatever the held positions.
@@ -342,6 +349,12 @@ impl Arm {
     /// Same kinematics as the PR2's and its joint names.
     fn is_pr2(&self) -> bool {
         self.solvers.closed_form() && self.names.iter().all(|n| pr2::ready(n).is_some())
+    }
+
+    fn changed(&self, limits: Vec<JointLimits>, held: Vec<HeldJoint>) -> Self {
+        let index = |name: &String| self.model.joints.iter().position(|j| j.name == *name);
+        let active: Vec<usize> = self.names.iter().filter_map(index).collect();
+        Self::assemble(self.model.clone(), self.spec.clone(), &active, limits, held)
     }
 
     fn assemble(

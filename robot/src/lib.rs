@@ -30,7 +30,7 @@ mod xml;
 
 pub use arm::{Arm, ArmError, ArmSpec, HeldJoint, Jacobian};
 pub use ik::{Branch, InverseKinematics, RedundantJoint, Solution, Solutions};
-pub use limits::JointLimits;
+pub use limits::{JointLimits, LimitsError};
 pub use pr2::Side;
 pub use urdf::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, Robot, SafetyController,
