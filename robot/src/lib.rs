@@ -26,7 +26,6 @@ mod ik;
 mod limits;
 mod pr2;
 mod urdf;
-mod xml;
 
 pub use arm::{Arm, ArmError, ArmSpec, HeldJoint, Jacobian};
 pub use ik::{Branch, InverseKinematics, RedundantJoint, Solution, Solutions};

@@ -1,15 +1,21 @@
 //! An arm of a robot: a serial chain with limits, poses, Jacobian and inverse kinematics.
 
+mod assembly;
+mod error;
+
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, SMatrix};
 
-use crate::chain::{Chain, Step, about};
+use crate::chain::Chain;
 use crate::fingerprint::fingerprint;
 use crate::ik::{InverseKinematics, RedundantJoint, Solvers};
 use crate::limits::{JointLimits, LimitsError, apply_toml};
 use crate::urdf::{Joint, JointKind, Model, Robot};
 use crate::{JointVector, MAX_DOF, pr2};
+use assembly::{Motion, Placement, Values, build_chain, build_placements, motion_of};
+
+pub use error::ArmError;
 
 /// Geometric Jacobian: rows linear x, y, z [m/s], angular x, y, z [rad/s] of the tip in the root
 /// frame; one column a joint, unused columns zero.
@@ -33,81 +39,6 @@ pub struct HeldJoint {
     pub position: f64,
 }
 
-/// Why an arm could not be made or changed.
-#[derive(Debug, thiserror::Error)]
-pub enum ArmError {
-    /// The link is not in the URDF.
-    #[error("no link {link} in robot {robot}; its links are: {}", known.join(", "))]
-    UnknownLink {
-        /// The link.
-        link: String,
-        /// The robot.
-        robot: String,
-        /// The links that there are.
-        known: Vec<String>,
-    },
-    /// The tip does not hang on the base.
-    #[error("link {tip} does not hang on link {base}: choose a base between the root and the tip")]
-    NotAChain {
-        /// The base link.
-        base: String,
-        /// The tip link.
-        tip: String,
-    },
-    /// Nothing moves.
-    #[error("no joint moves between {base} and {tip}")]
-    NoJoints {
-        /// The base link.
-        base: String,
-        /// The tip link.
-        tip: String,
-    },
-    /// Too much moves.
-    #[error(
-        "{} joints move between the links ({}), at most {MAX_DOF} are supported: choose a base nearer to the tip",
-        joints.len(),
-        joints.join(", ")
-    )]
-    TooManyJoints {
-        /// The joints.
-        joints: Vec<String>,
-    },
-    /// A joint of the arm follows another joint.
-    #[error("joint {joint} of the arm mimics another joint: parallel linkages are not supported")]
-    MimicInChain {
-        /// The joint.
-        joint: String,
-    },
-    /// A joint of the arm has no usable limits.
-    #[error(
-        "joint {joint} of the arm has no usable <limit>: a velocity above 0 and, unless it is continuous, lower < upper are needed"
-    )]
-    NoLimits {
-        /// The joint.
-        joint: String,
-    },
-    /// A held joint that is not there.
-    #[error("{joint} is not held by this arm; held are: {}", known.join(", "))]
-    NotHeld {
-        /// The joint.
-        joint: String,
-        /// The held joints.
-        known: Vec<String>,
-    },
-    /// A position for a held joint outside its limits.
-    #[error("{joint} cannot be held at {position}: its range is {lower} … {upper}")]
-    HeldOutside {
-        /// The joint.
-        joint: String,
-        /// The position. [rad or m]
-        position: f64,
-        /// Lower hard limit.
-        lower: f64,
-        /// Upper hard limit.
-        upper: f64,
-    },
-}
-
 /// A serial arm with all other joints of the robot held.
 ///
 /// Immutable and shareable between threads; [`Arm::with_held`] makes a changed copy.
@@ -125,26 +56,6 @@ pub struct Arm {
     /// How each link follows from its parent, parents first.
     placements: Vec<Placement>,
     solvers: Solvers,
-}
-
-/// A link's pose from its parent's.
-#[derive(Clone)]
-struct Placement {
-    link: usize,
-    parent: usize,
-    /// Fixed part, with the motion of held joints in it.
-    local: Isometry3<f64>,
-    motion: Motion,
-}
-
-#[derive(Clone)]
-enum Motion {
-    /// Does not move with the arm: `local` is the pose in the root frame.
-    Static,
-    /// Fixed to a link that moves.
-    Carried,
-    /// Moves by factor · q[joint] + offset about or along an axis.
-    Joint { axis: nalgebra::Vector3<f64>, prismatic: bool, source: usize, factor: f64, offset: f64 },
 }
 
 impl Robot {
@@ -431,108 +342,4 @@ fn rest(joint: &Joint) -> f64 {
         (lower, upper) = (lower.max(soft_lower), upper.min(soft_upper));
     }
     pr2::aside(&joint.name).unwrap_or(0.0).min(upper).max(lower)
-}
-
-/// Which value each joint of the robot has.
-struct Values<'a> {
-    model: &'a Model,
-    active: &'a [usize],
-    held: &'a [HeldJoint],
-}
-
-/// The value of a joint: factor · q[source] + offset, or a constant.
-enum Value {
-    Constant(f64),
-    Follows { source: usize, factor: f64, offset: f64 },
-}
-
-impl Values<'_> {
-    fn of(&self, mut index: usize) -> Value {
-        let (mut factor, mut offset) = (1.0, 0.0);
-        while let Some(mimic) = self.model.joints[index].mimic {
-            offset += factor * mimic.offset;
-            factor *= mimic.multiplier;
-            index = mimic.joint;
-        }
-        if let Some(source) = self.active.iter().position(|&a| a == index) {
-            return Value::Follows { source, factor, offset };
-        }
-        let name = &self.model.joints[index].name;
-        let position = self.held.iter().find(|h| h.name == *name).map_or(0.0, |h| h.position);
-        Value::Constant(factor * position + offset)
-    }
-}
-
-fn motion_of(axis: &nalgebra::Vector3<f64>, prismatic: bool, value: f64) -> Isometry3<f64> {
-    if prismatic {
-        Isometry3::from_parts((axis * value).into(), nalgebra::UnitQuaternion::identity())
-    } else {
-        Isometry3::from_parts(nalgebra::Translation3::identity(), about(axis, value))
-    }
-}
-
-fn build_chain(values: &Values<'_>, tip: usize) -> Chain {
-    let model = values.model;
-    let mut joints = Vec::new();
-    let mut link = tip;
-    while let Some(index) = model.links[link].parent_joint {
-        joints.push(index);
-        link = model.joints[index].parent;
-    }
-    let mut steps = Vec::new();
-    let mut fixed = Isometry3::identity();
-    for &index in joints.iter().rev() {
-        let joint = &model.joints[index];
-        fixed *= joint.origin;
-        let prismatic = joint.kind == JointKind::Prismatic;
-        match values.of(index) {
-            _ if joint.kind == JointKind::Fixed => {}
-            Value::Constant(value) => {
-                fixed *= motion_of(&joint.axis, prismatic, value);
-            }
-            Value::Follows { .. } => {
-                steps.push(Step::new(fixed, *joint.axis, prismatic));
-                fixed = Isometry3::identity();
-            }
-        }
-    }
-    Chain { steps, tip: fixed }
-}
-
-fn build_placements(values: &Values<'_>) -> (Vec<Placement>, Vec<usize>) {
-    let model = values.model;
-    let mut moving = Vec::new();
-    let mut root_poses = vec![Isometry3::identity(); model.links.len()];
-    let root = model.root;
-    let mut placements = vec![Placement {
-        link: root,
-        parent: root,
-        local: Isometry3::identity(),
-        motion: Motion::Static,
-    }];
-    for &index in &model.order {
-        let joint = &model.joints[index];
-        let (link, parent) = (joint.child, joint.parent);
-        let prismatic = joint.kind == JointKind::Prismatic;
-        let carried = moving.contains(&parent);
-        let mut local = joint.origin;
-        let mut motion = if carried { Motion::Carried } else { Motion::Static };
-        if joint.kind != JointKind::Fixed {
-            match values.of(index) {
-                Value::Constant(value) => local *= motion_of(&joint.axis, prismatic, value),
-                Value::Follows { source, factor, offset } => {
-                    motion = Motion::Joint { axis: *joint.axis, prismatic, source, factor, offset };
-                }
-            }
-        }
-        match motion {
-            Motion::Static => {
-                local = root_poses[parent] * local;
-                root_poses[link] = local;
-            }
-            Motion::Carried | Motion::Joint { .. } => moving.push(link),
-        }
-        placements.push(Placement { link, parent, local, motion });
-    }
-    (placements, moving)
 }
