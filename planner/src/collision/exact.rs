@@ -166,10 +166,10 @@ impl<'a> Exact<'a> {
         for &i in parts {
             let may_touch = contact == ToolContact::Allowed && scene.at_tip[i];
             let is_pad = scene.parts[i].is_pad;
-            let outside = if may_touch && is_pad {
-                margins.environment.min(margins.contact_growth)
-            } else {
-                margins.environment
+            let outside = match (may_touch, is_pad) {
+                (true, true) => margins.environment.min(margins.contact_growth),
+                (true, false) => margins.environment.min(margins.contact_clearance),
+                (false, _) => margins.environment,
             };
             let shape = &*scene.shapes.parts[i].shape;
             for p in &scene.points {

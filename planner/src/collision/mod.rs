@@ -24,9 +24,11 @@
 //!   if the point lies deeper than [`Margins::contact_depth`] inside of it;
 //! - every other shape keeps its full margin.
 //!
-//! Scan points outside the prism keep the full margin from every shape but the pad, which keeps
-//! the smaller of it and `contact_growth`: a flat surface beside the pad is then no collision,
-//! while anything behind the pad's back still is. Obstacles are never contact.
+//! Scan points outside the prism keep the full margin from every shape that is not rigid to the
+//! tip. The pad keeps the smaller of it and `contact_growth`, the other shapes that are rigid to
+//! the tip the smaller of it and [`Margins::contact_clearance`]: a flat surface beside the pad,
+//! 11 mm before the fingertips, is then no collision, while anything behind the pad's back still
+//! is. Obstacles are never contact.
 
 mod bodies;
 mod check;
@@ -67,6 +69,9 @@ pub struct Margins {
     pub contact_growth: f64,
     /// How far the contact prism reaches before the pad's plane.
     pub contact_front: f64,
+    /// What shapes that are rigid to the tip keep from scan points outside the prism while contact
+    /// is allowed.
+    pub contact_clearance: f64,
     /// How deep a point of the contact prism may lie inside a shape that is rigid to the tip.
     pub contact_depth: f64,
 }
@@ -78,6 +83,7 @@ impl Default for Margins {
             environment: 0.010,
             contact_growth: 0.005,
             contact_front: 0.015,
+            contact_clearance: 0.003,
             contact_depth: 0.003,
         }
     }

@@ -283,7 +283,7 @@ impl Touch {
         let (margin, depth) = if part.is_pad {
             (margins.environment.min(margins.contact_growth), f64::INFINITY)
         } else {
-            (margins.environment, margins.contact_depth)
+            (margins.environment.min(margins.contact_clearance), margins.contact_depth)
         };
         // Bounds of the shape grown by its margin, in the contact frame.
         let local = contact.frame.inverse_then(place);
@@ -332,6 +332,7 @@ fn check_input(points: &[Point3<f64>], margins: &Margins) -> Result<(), Collisio
         ("environment", margins.environment),
         ("contact_growth", margins.contact_growth),
         ("contact_front", margins.contact_front),
+        ("contact_clearance", margins.contact_clearance),
         ("contact_depth", margins.contact_depth),
     ] {
         if !(value >= 0.0 && value.is_finite()) {
