@@ -7,11 +7,13 @@ pub mod collision;
 pub mod coverage;
 pub mod gtsp;
 pub mod patches;
+pub mod reach;
 pub mod report;
 pub mod scan;
 pub mod simulate;
 pub mod surface;
 pub mod tool;
+pub mod transfer;
 
 mod fit;
 mod grid;

@@ -5,6 +5,7 @@ use super::bodies::{Bodies, MAX_BODIES};
 use super::world::{Moving, World};
 use nalgebra::Vector3;
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
+use std::collections::VecDeque;
 
 /// How much farther than its margin each body has to be. \[m\]
 #[derive(Clone, Debug)]
@@ -167,8 +168,9 @@ impl World {
         if !self.is_free(b, contact) || !self.is_free(a, contact) {
             return false;
         }
-        let mut open = vec![(0.0, 1.0, 0)];
-        while let Some((from, to, depth)) = open.pop() {
+        // Coarse pieces first: they find a collision soonest.
+        let mut open = VecDeque::from([(0.0, 1.0, 0)]);
+        while let Some((from, to, depth)) = open.pop_front() {
             let middle = 0.5 * (from + to);
             let q: JointVector = std::array::from_fn(|j| a[j] + middle * (b[j] - a[j]));
             if self.is_clear(&q, contact, &ways.scaled(0.5 * (to - from))) {
@@ -177,8 +179,8 @@ impl World {
             if depth == HALVINGS || !self.is_free(&q, contact) {
                 return false;
             }
-            open.push((middle, to, depth + 1));
-            open.push((from, middle, depth + 1));
+            open.push_back((from, middle, depth + 1));
+            open.push_back((middle, to, depth + 1));
         }
         true
     }
