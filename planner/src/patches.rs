@@ -54,7 +54,8 @@ impl Default for PatchConfig {
 /// A locally planar piece of the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
-    /// A point of the plane in the middle of the patch, over a point of the scan. \[m\]
+    /// The inlier in the middle of the patch. Not its foot on the plane, which on a curved body
+    /// lies some millimetres inside the surface that the tool has to touch. \[m\]
     pub centre: Point3<f64>,
     /// The plane's unit normal, on the side of the scan's normals.
     pub normal: UnitVector3<f64>,
@@ -194,8 +195,7 @@ fn fit(
         let apart = |index: u32| (point(index) - plane.centroid).norm_squared();
         apart(a).total_cmp(&apart(b))
     })?;
-    let offset = (point(middle) - plane.centroid).dot(&normal);
-    let centre = point(middle) - normal.scale(offset);
+    let centre = point(middle);
     Some(Patch { centre, normal, points: best, rmse })
 }
 

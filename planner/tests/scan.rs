@@ -179,15 +179,18 @@ fn patches_are_planar_disjoint_and_face_the_scans_side() {
     let config = PatchConfig::default();
     let mut taken = vec![false; scan.points.len()];
     for patch in patches::find(&scan, &config, 2) {
-        let mut sum = 0.0;
+        let mut heights = Vec::new();
         for &index in &patch.points {
             let point = scan.points[index as usize];
             assert!(!std::mem::replace(&mut taken[index as usize], true), "a point of two patches");
             assert!((point - patch.centre).norm() < 2.0 * config.epsilon);
-            sum += (point - patch.centre).dot(&patch.normal).powi(2);
+            heights.push((point - patch.centre).dot(&patch.normal));
             assert!(scan.normals[index as usize].dot(&patch.normal) > 0.0);
         }
-        let rmse = (sum / patch.points.len() as f64).sqrt();
+        assert!(heights.contains(&0.0), "the centre is a point of the patch");
+        let count = heights.len() as f64;
+        let mean = heights.iter().sum::<f64>() / count;
+        let rmse = (heights.iter().map(|h| (h - mean).powi(2)).sum::<f64>() / count).sqrt();
         assert!((rmse - patch.rmse).abs() < 1e-9, "stored {} recomputed {rmse}", patch.rmse);
         assert!(rmse <= config.max_rmse);
     }

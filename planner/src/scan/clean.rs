@@ -1,6 +1,6 @@
 //! From placed views to a [`Scan`]: merge, filter, estimate normals, smooth.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use rayon::prelude::*;
@@ -16,8 +16,8 @@ use crate::grid::Grid;
 /// How to clean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CleanConfig {
-    /// Points of one view within one cube of this side become their mean before smoothing, and one
-    /// of all views' is kept after it. \[m\]
+    /// Points of one view within one cube of this side become their mean before smoothing, and those
+    /// of all views after it. \[m\]
     pub voxel: f64,
     /// The voxel grows until no more points than this are left.
     pub max_points: usize,
@@ -103,24 +103,18 @@ pub fn clean(scan: &PlacedScan, config: &CleanConfig) -> Result<(Scan, CleanRepo
     let (smooth, normals) = smooth(&points, &normals, radius);
     let squares: f64 = smooth.iter().zip(&points).map(|(a, b)| (a - b).norm_squared()).sum();
     let noise = (squares / points.len() as f64).sqrt();
-    let kept = one_per_voxel(&smooth, voxel);
+    let smooth = merge_layers(&smooth, &normals, &points, voxel);
+    let spacing = median_spacing(&smooth.points);
+    let scan = Scan { spacing, ..smooth };
     let report = CleanReport {
         points: total,
-        kept: kept.len(),
-        merged: merged + points.len() - kept.len(),
+        kept: scan.points.len(),
+        merged: merged + points.len() - scan.points.len(),
         outliers,
         loose,
         voxel,
         radius,
         noise,
-    };
-    let smooth: Vec<Point3<f64>> = kept.iter().map(|&i| smooth[i]).collect();
-    let spacing = median_spacing(&smooth);
-    let scan = Scan {
-        points: smooth,
-        normals: kept.iter().map(|&i| normals[i]).collect(),
-        raw: kept.iter().map(|&i| points[i]).collect(),
-        spacing,
     };
     Ok((scan, report))
 }
@@ -305,13 +299,42 @@ fn smooth(
         .unzip()
 }
 
-/// The first point in each voxel, ascending. The sensor's noise spreads a surface over several
-/// layers of voxels, which smoothing lays onto each other.
-fn one_per_voxel(points: &[Point3<f64>], voxel: f64) -> Vec<usize> {
-    let mut seen = HashSet::new();
-    let mut kept: Vec<usize> = (0..points.len()).collect();
-    kept.retain(|&i| seen.insert([0, 1, 2].map(|axis| (points[i][axis] / voxel).floor() as i64)));
-    kept
+/// The means of what lies in each voxel on one side of a sheet; the spacing is left at zero. The
+/// sensor's noise spreads a surface over several layers of voxels, which smoothing lays onto each
+/// other. A mean, as any choice by order would prefer one layer and shift the raw points.
+fn merge_layers(
+    points: &[Point3<f64>],
+    normals: &[UnitVector3<f64>],
+    raw: &[Point3<f64>],
+    voxel: f64,
+) -> Scan {
+    let mut groups: Vec<(Vec<usize>, UnitVector3<f64>)> = Vec::new();
+    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    for (i, normal) in normals.iter().enumerate() {
+        let key = [0, 1, 2].map(|axis| (points[i][axis] / voxel).floor() as i64);
+        let sides = cells.entry(key).or_default();
+        match sides.iter().find(|&&group| groups[group].1.dot(normal) > 0.0) {
+            Some(&group) => groups[group].0.push(i),
+            None => {
+                sides.push(groups.len());
+                groups.push((vec![i], *normal));
+            }
+        }
+    }
+    let mean = |members: &[usize], of: &[Point3<f64>]| {
+        let sum: Vector3<f64> = members.iter().map(|&i| of[i].coords).sum();
+        Point3::from(sum / members.len() as f64)
+    };
+    let normal = |members: &[usize], first: UnitVector3<f64>| {
+        let sum: Vector3<f64> = members.iter().map(|&i| normals[i].into_inner()).sum();
+        UnitVector3::try_new(sum, 1e-9).unwrap_or(first)
+    };
+    Scan {
+        points: groups.iter().map(|(members, _)| mean(members, points)).collect(),
+        normals: groups.iter().map(|(members, first)| normal(members, *first)).collect(),
+        raw: groups.iter().map(|(members, _)| mean(members, raw)).collect(),
+        spacing: 0.0,
+    }
 }
 
 /// Median distance from a point to its nearest neighbour, over at most 2,000 of them.

@@ -35,7 +35,8 @@ pub struct Scan {
     pub points: Vec<Point3<f64>>,
     /// Outward unit normals of `points`.
     pub normals: Vec<UnitVector3<f64>>,
-    /// What the sensor measured for each of `points`, before smoothing. \[m\]
+    /// What the sensor measured for each of `points`: before smoothing, the mean of the
+    /// measurements within the voxel. \[m\]
     pub raw: Vec<Point3<f64>>,
     /// Median distance from a point to its nearest neighbour. \[m\]
     pub spacing: f64,

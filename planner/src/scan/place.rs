@@ -29,6 +29,14 @@ pub enum Placement {
         /// Of the support above the floor. \[m\]
         support_height: f64,
     },
+    /// The pose that takes the file's coordinates to the floor frame, and the sensor's position
+    /// there if it is known: for a further file in the frame of one that was placed before.
+    Frame {
+        /// File to floor frame.
+        pose: Isometry3<f64>,
+        /// In the floor frame. \[m\]
+        sensor: Option<Point3<f64>>,
+    },
     /// The file's own VIEWPOINT is the sensor's pose in the floor frame and the points are in the
     /// sensor's frame. Without one in the file, the identity.
     Viewpoint,
@@ -53,12 +61,11 @@ pub struct PlacedScan {
 }
 
 /// Moves a scan into the floor frame. Returns it with the pose that takes the file's coordinates
-/// there, so that a second view of the same frame can be placed with
-/// [`Placement::SensorPose`].
+/// there, so that a second file in the same frame can be placed with [`Placement::Frame`].
 #[must_use]
 pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64>) {
     let pose = match placement {
-        Placement::SensorPose(pose) => *pose,
+        Placement::SensorPose(pose) | Placement::Frame { pose, .. } => *pose,
         Placement::Viewpoint => raw.viewpoint.unwrap_or_default(),
         Placement::UpAndHeight { up, sensor_height, support_height } => {
             let upright = upright(up);
@@ -76,6 +83,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
     };
     let sensor = match placement {
         Placement::Up { .. } => None,
+        Placement::Frame { sensor, .. } => *sensor,
         _ => Some(Point3::from(pose.translation.vector)),
     };
     let view = View {
@@ -233,6 +241,9 @@ mod tests {
         let (placed, _) = place(&scan, &placement);
         assert!((placed.views[0].points[0] - Point3::new(-1.0, -1.0, 0.72)).norm() < 1e-12);
         assert_eq!(placed.views[0].sensor, None);
+        let (_, pose) = place(&scan, &placement);
+        let again = place(&scan, &Placement::Frame { pose, sensor: None }).0;
+        assert_eq!(again, placed);
     }
 
     #[test]
