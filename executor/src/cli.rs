@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -18,6 +18,7 @@ use signal_hook::flag;
 
 use crate::executor::{Config, Summary, run};
 use crate::guard::Guard;
+use crate::record::replay;
 
 /// How long `ctl` waits for an answer.
 const ANSWER_WITHIN: Duration = Duration::from_secs(1);
@@ -36,6 +37,11 @@ enum Action {
     Run(Box<RunArgs>),
     /// Send a command to a running executor.
     Ctl(CtlArgs),
+    /// Replay a flight recording and compare every setpoint, to the bit.
+    Replay {
+        /// A file that `run --record` wrote.
+        file: PathBuf,
+    },
 }
 
 #[derive(Debug, Args)]
@@ -95,6 +101,12 @@ struct RunArgs {
     /// Acceleration of stops, pauses and changes of speed along the path, each joint. [rad/s²]
     #[arg(long, default_value_t = 10.0)]
     stop_acceleration: f64,
+    /// Folder for the flight recorder: two files that take turns.
+    #[arg(long, value_name = "FOLDER")]
+    record: Option<PathBuf>,
+    /// Size of each of them; 1 MiB holds about 2.5 s.
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..))]
+    record_mib: u64,
 }
 
 #[derive(Debug, Args)]
@@ -146,6 +158,7 @@ where
     let result = match cli.command {
         Action::Run(args) => run_command(&args),
         Action::Ctl(args) => ctl_command(&args),
+        Action::Replay { file } => replay_command(&file),
     };
     match result {
         Ok(code) => code,
@@ -239,7 +252,20 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         priority: args.priority,
         cpu: args.cpu,
         spin_ns: u64::from(spin_us) * 1000,
+        record: args.record.clone().map(|folder| (folder, args.record_mib << 20)),
     })
+}
+
+fn replay_command(file: &Path) -> anyhow::Result<ExitCode> {
+    let replayed = replay(file)?;
+    for (cycle, event) in &replayed.events {
+        println!("cycle {cycle}: plan {} {}: {}", event.plan, event.kind, event.why);
+    }
+    println!(
+        "{} cycles, {} setpoints, all the same to the bit; {} bytes of a torn record left out",
+        replayed.cycles, replayed.setpoints, replayed.torn
+    );
+    Ok(ExitCode::SUCCESS)
 }
 
 fn ctl_command(args: &CtlArgs) -> anyhow::Result<ExitCode> {

@@ -14,6 +14,7 @@ use crate::admit::Held;
 use crate::cycle::{Input, Measured, State, Target, step};
 use crate::guard::Guard;
 use crate::hardware::Hardware;
+use crate::record::Tape;
 use crate::rt::Wake;
 use crate::slots::{Report, Slots};
 
@@ -27,6 +28,7 @@ pub struct Driver<H> {
     guard: Guard,
     state: State,
     slots: Arc<Slots>,
+    tape: Option<Arc<Tape>>,
     lateness: [u32; HISTOGRAM_BUCKETS],
     compute: [u32; HISTOGRAM_BUCKETS],
     cycles: u64,
@@ -42,11 +44,17 @@ impl<H: Hardware> Driver<H> {
             guard,
             state: State::default(),
             slots,
+            tape: None,
             lateness: [0; HISTOGRAM_BUCKETS],
             compute: [0; HISTOGRAM_BUCKETS],
             cycles: 0,
             failures: 0,
         }
+    }
+
+    /// Hands every cycle on to the flight recorder.
+    pub(crate) fn record(&mut self, tape: Arc<Tape>) {
+        self.tape = Some(tape);
     }
 
     /// The endpoint.
@@ -89,11 +97,15 @@ impl<H: Hardware> Driver<H> {
             offer: if room { self.slots.offers.pop() } else { None },
             missed: wake.missed,
         };
+        let record = self.tape.is_some().then(|| Tape::input(&input, wake.now_ns));
         let out = step(&mut self.state, input, wake.now_ns, &self.guard);
         if let Some(target) = &out.setpoint
             && self.hardware.write(&self.setpoint(target, wake)).is_err()
         {
             self.failures += 1;
+        }
+        if let (Some(tape), Some(record)) = (&self.tape, record) {
+            tape.push(record, out.setpoint.as_ref(), &self.state);
         }
         for event in &out.events {
             // There is room: asked before the plan was taken, and faults end what was taken.

@@ -15,6 +15,7 @@ use crate::cycle::{Ask, Order};
 use crate::driver::Driver;
 use crate::guard::Guard;
 use crate::hardware::{Hardware, IpcHardware};
+use crate::record::{Recorder, Tape};
 use crate::rt::{self, Grid};
 use crate::service::Service;
 use crate::slots::Slots;
@@ -46,6 +47,8 @@ pub struct Config {
     pub cpu: Option<usize>,
     /// The last part of each period that is spent spinning, where FIFO is granted. \[ns\]
     pub spin_ns: u64,
+    /// Folder of the flight recorder, and the size of each of its two files. \[bytes\]
+    pub record: Option<(PathBuf, u64)>,
 }
 
 /// Why an executor could not start or run to a clean end.
@@ -61,6 +64,14 @@ pub enum ExecutorError {
         count: usize,
         /// How many may be.
         most: usize,
+    },
+    /// The flight recorder's folder cannot be used.
+    #[error("flight recorder: {}: {error}", .folder.display())]
+    Record {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        error: std::io::Error,
     },
     /// A thread could not be started.
     #[error("a thread could not be started: {0}")]
@@ -100,12 +111,14 @@ pub struct Summary {
 pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, ExecutorError> {
     let rules = rules(arm, config)?;
     let slots = Arc::new(Slots::default());
+    let tape = config.record.as_ref().map(|_| Arc::new(Tape::default()));
+    let recorder = recorder(config, tape.as_ref())?;
     let done = AtomicBool::new(false);
     let down = AtomicBool::new(false);
     thread::scope(|scope| {
         let worker = spawn(scope, "worker", || {
             let ipc = open(config)?;
-            let worker = Worker::open(&ipc, slots.clone(), rules)?;
+            let worker = Worker::open(&ipc, slots.clone(), rules, recorder)?;
             worker.run(&done);
             Ok(())
         })?;
@@ -120,7 +133,10 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
             rt::enter_pool();
             let ipc = open(config)?;
             let hardware = IpcHardware::open(&ipc)?;
-            let driver = Driver::new(hardware, config.guard, slots.clone());
+            let mut driver = Driver::new(hardware, config.guard, slots.clone());
+            if let Some(tape) = tape {
+                driver.record(tape);
+            }
             Ok(run_loop(driver, config, &down, &done))
         })?;
 
@@ -216,6 +232,13 @@ fn rules(arm: &Arm, config: &Config) -> Result<Rules, ExecutorError> {
         held_tolerance: config.held_tolerance,
         since_ns: now_ns(),
     })
+}
+
+fn recorder(config: &Config, tape: Option<&Arc<Tape>>) -> Result<Option<Recorder>, ExecutorError> {
+    let (Some((folder, limit)), Some(tape)) = (&config.record, tape) else { return Ok(None) };
+    Recorder::new(tape.clone(), folder, *limit, config.guard)
+        .map(Some)
+        .map_err(|error| ExecutorError::Record { folder: folder.clone(), error })
 }
 
 fn open(config: &Config) -> Result<Ipc, IpcError> {

@@ -4,12 +4,14 @@
 //! ends of a segment are hit to the bit.
 
 use crate::MAX_DOF;
+use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::Interpolation;
 
 use crate::Joints;
 
 /// A knot as the loop reads it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct PlanKnot {
     /// Time since the plan's start, a whole number, exact to 2^53. \[ns\]
     pub time: f64,

@@ -11,6 +11,7 @@ use nullsweep_ipc_types::{EventKind, Knot, MAX_KNOTS, Reason};
 
 use crate::admit::{Held, Rejection, Rules, admit};
 use crate::cycle::Event;
+use crate::record::Recorder;
 use crate::slots::Slots;
 
 /// Pause between two looks.
@@ -27,12 +28,19 @@ pub(crate) struct Worker<'a> {
     rules: Rules,
     copy: Vec<Knot>,
     held: Option<Held>,
+    recorder: Option<Recorder>,
 }
 
 impl<'a> Worker<'a> {
-    pub(crate) fn open(ipc: &'a Ipc, slots: Arc<Slots>, rules: Rules) -> Result<Self, IpcError> {
+    pub(crate) fn open(
+        ipc: &'a Ipc,
+        slots: Arc<Slots>,
+        rules: Rules,
+        recorder: Option<Recorder>,
+    ) -> Result<Self, IpcError> {
         let receiver = ipc.plan_receiver()?;
-        Ok(Self { ipc, receiver, slots, rules, copy: Vec::with_capacity(MAX_KNOTS), held: None })
+        let copy = Vec::with_capacity(MAX_KNOTS);
+        Ok(Self { ipc, receiver, slots, rules, copy, held: None, recorder })
     }
 
     /// Runs until `done`.
@@ -46,6 +54,7 @@ impl<'a> Worker<'a> {
                 self.held = Some(held);
             }
             self.take_plan();
+            self.write_record(Recorder::round);
             if swept.elapsed() >= SWEEP {
                 let count = self.ipc.sweep_dead_nodes();
                 if count > 0 {
@@ -54,6 +63,18 @@ impl<'a> Worker<'a> {
                 swept = Instant::now();
             }
             thread::sleep(ROUND);
+        }
+        self.write_record(Recorder::round);
+        self.write_record(Recorder::finish);
+    }
+
+    /// Writes to the flight recorder; where that fails, the executor runs on without it.
+    fn write_record(&mut self, write: fn(&mut Recorder) -> std::io::Result<()>) {
+        if let Some(recorder) = &mut self.recorder
+            && let Err(e) = write(recorder)
+        {
+            tracing::error!("the flight recorder stops: {e}");
+            self.recorder = None;
         }
     }
 
@@ -83,7 +104,16 @@ impl<'a> Worker<'a> {
                 plan.duration() * 1e-9,
                 start.elapsed().as_secs_f64() * 1e3,
             );
-            self.slots.offers.push(Arc::new(plan)).map_err(|_| Rejection::new(Reason::QueueFull))
+            let plan = Arc::new(plan);
+            if let Some(recorder) = &mut self.recorder {
+                recorder.plan(&plan);
+            }
+            self.slots.offers.push(plan).map_err(|plan| {
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.withdraw(&plan);
+                }
+                Rejection::new(Reason::QueueFull)
+            })
         });
         if let Err(why) = result {
             tracing::warn!("plan {} rejected: {why}", header.id);

@@ -51,6 +51,16 @@ pub struct ValidPlan {
 }
 
 impl ValidPlan {
+    /// A plan that was admitted before it was recorded.
+    pub(crate) fn recorded(
+        id: PlanId,
+        join: Join,
+        interpolation: Interpolation,
+        knots: Vec<PlanKnot>,
+    ) -> Self {
+        Self { id, join, interpolation, knots }
+    }
+
     /// Names it.
     #[must_use]
     pub fn id(&self) -> PlanId {

@@ -16,6 +16,7 @@
 //! Any mode but Init goes to Fault. The commanded position is always continued from the last
 //! commanded one.
 
+mod checkpoint;
 mod command;
 mod motion;
 mod offer;
@@ -32,6 +33,7 @@ use crate::admit::{Rejection, ValidPlan};
 use crate::guard::Guard;
 use crate::path::Path;
 
+pub use checkpoint::{Checkpoint, MeasuredRecord};
 pub use command::{Ask, Order, Reply};
 pub use supervise::Measured;
 

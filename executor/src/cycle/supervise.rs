@@ -31,14 +31,14 @@ pub struct Measured {
 /// What supervision remembers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
-    newest: Option<Measured>,
-    fresh_ns: u64,
-    following: u32,
-    unheard: u32,
-    window_start_ns: u64,
-    window_cycles: u32,
-    rates: [f64; RATE_WINDOWS],
-    windows: u64,
+    pub(super) newest: Option<Measured>,
+    pub(super) fresh_ns: u64,
+    pub(super) following: u32,
+    pub(super) unheard: u32,
+    pub(super) window_start_ns: u64,
+    pub(super) window_cycles: u32,
+    pub(super) rates: [f64; RATE_WINDOWS],
+    pub(super) windows: u64,
 }
 
 /// How a fault ends the motion.

@@ -1,0 +1,204 @@
+//! The flight recorder: every cycle's input and setpoint, so that what happened can be replayed
+//! bit for bit.
+//!
+//! The loop hands each cycle on through a lock-free queue; the worker writes. A recording begins
+//! with the loop's memory at a moment without plans. Two files take turns, so the newest part is
+//! always there and the disk does not fill: when one has its size, the recorder changes over at
+//! the next moment without plans.
+
+mod format;
+mod replay;
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use crossbeam::queue::ArrayQueue;
+
+use crate::admit::ValidPlan;
+use crate::cycle::{Checkpoint, Input, State, Target};
+use crate::guard::Guard;
+use format::{CycleRecord, GuardRecord, MAGIC, PlanRecord, Tag, put};
+
+pub use replay::{ReplayError, Replayed, replay};
+
+/// Cycles that may wait for the worker: four seconds at 1 kHz.
+const WAITING: usize = 4096;
+/// Bytes that are gathered before they are written.
+const CHUNK: usize = 64 << 10;
+
+/// The loop's end of the recorder.
+#[derive(Debug)]
+pub(crate) struct Tape {
+    cycles: ArrayQueue<CycleRecord>,
+    checkpoints: ArrayQueue<Checkpoint>,
+    wanted: AtomicBool,
+    lost: AtomicU64,
+}
+
+impl Default for Tape {
+    fn default() -> Self {
+        Self {
+            cycles: ArrayQueue::new(WAITING),
+            checkpoints: ArrayQueue::new(1),
+            wanted: AtomicBool::new(true),
+            lost: AtomicU64::new(0),
+        }
+    }
+}
+
+impl Tape {
+    /// Before a cycle: notes what it gets.
+    pub(crate) fn input(input: &Input, now_ns: u64) -> CycleRecord {
+        CycleRecord::of(input, now_ns)
+    }
+
+    /// After it: adds what it gave and hands it on, with the loop's memory where one is wanted.
+    pub(crate) fn push(&self, mut record: CycleRecord, target: Option<&Target>, state: &State) {
+        record.target = target.into();
+        if self.wanted.load(Ordering::Relaxed)
+            && let Some(checkpoint) = state.checkpoint()
+            && self.checkpoints.push(checkpoint).is_ok()
+        {
+            record.checkpoint = 1;
+            self.wanted.store(false, Ordering::Relaxed);
+        }
+        if self.cycles.push(record).is_err() {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// The worker's end.
+#[derive(Debug)]
+pub(crate) struct Recorder {
+    tape: Arc<Tape>,
+    folder: PathBuf,
+    limit: u64,
+    guard: Guard,
+    file: Option<File>,
+    turn: usize,
+    written: u64,
+    buffer: Vec<u8>,
+    /// Plans that the loop has not taken yet.
+    offered: Vec<Arc<ValidPlan>>,
+    lost: u64,
+}
+
+impl Recorder {
+    /// Records into `folder`, two files of about `limit` bytes each.
+    pub(crate) fn new(
+        tape: Arc<Tape>,
+        folder: &Path,
+        limit: u64,
+        guard: Guard,
+    ) -> io::Result<Self> {
+        fs::create_dir_all(folder)?;
+        Ok(Self {
+            tape,
+            folder: folder.to_path_buf(),
+            limit,
+            guard,
+            file: None,
+            turn: 0,
+            written: 0,
+            buffer: Vec::with_capacity(2 * CHUNK),
+            offered: Vec::new(),
+            lost: 0,
+        })
+    }
+
+    /// Notes a plan that is about to be offered to the loop.
+    pub(crate) fn plan(&mut self, plan: &Arc<ValidPlan>) {
+        if self.file.is_some() {
+            put_plan(&mut self.buffer, plan);
+        }
+        self.offered.push(plan.clone());
+    }
+
+    /// Forgets a plan that the loop could not be offered.
+    pub(crate) fn withdraw(&mut self, plan: &ValidPlan) {
+        self.offered.retain(|p| p.id() != plan.id());
+    }
+
+    /// Writes what the loop handed on.
+    pub(crate) fn round(&mut self) -> io::Result<()> {
+        let lost = self.tape.lost.load(Ordering::Relaxed);
+        if lost > self.lost {
+            // A recording with a hole cannot be replayed past it: begin anew.
+            tracing::warn!("flight recorder: {} cycles were not written", lost - self.lost);
+            self.lost = lost;
+            self.finish()?;
+            self.want_checkpoint();
+        }
+        for _ in 0..WAITING {
+            let Some(record) = self.tape.cycles.pop() else { break };
+            if self.file.is_some() {
+                put(&mut self.buffer, Tag::Cycle, &[bytemuck::bytes_of(&record)]);
+            }
+            self.offered.retain(|p| p.id() != record.offer);
+            if record.checkpoint != 0
+                && let Some(checkpoint) = self.tape.checkpoints.pop()
+            {
+                self.change_over(&checkpoint)?;
+            }
+            if self.buffer.len() >= CHUNK {
+                self.write()?;
+            }
+        }
+        if self.written > self.limit && self.file.is_some() {
+            self.want_checkpoint();
+        }
+        if self.written > 2 * self.limit {
+            // One endless plan: the bound comes first, and recording goes on after it.
+            self.finish()?;
+        }
+        Ok(())
+    }
+
+    /// Writes what is left.
+    pub(crate) fn finish(&mut self) -> io::Result<()> {
+        self.write()?;
+        self.file = None;
+        self.written = 0;
+        Ok(())
+    }
+
+    fn want_checkpoint(&self) {
+        self.tape.wanted.store(true, Ordering::Relaxed);
+    }
+
+    fn change_over(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {
+        self.finish()?;
+        let path = self.folder.join(format!("flight-{}.nswrec", self.turn));
+        self.turn = 1 - self.turn;
+        self.file = Some(File::create(&path)?);
+        tracing::info!("recording to {}", path.display());
+        self.buffer.extend_from_slice(MAGIC);
+        put(&mut self.buffer, Tag::Guard, &[bytemuck::bytes_of(&GuardRecord::from(&self.guard))]);
+        put(&mut self.buffer, Tag::Checkpoint, &[bytemuck::bytes_of(checkpoint)]);
+        for plan in &self.offered {
+            put_plan(&mut self.buffer, plan);
+        }
+        self.write()
+    }
+
+    fn write(&mut self) -> io::Result<()> {
+        if let Some(file) = &mut self.file {
+            file.write_all(&self.buffer)?;
+            self.written += self.buffer.len() as u64;
+        }
+        self.buffer.clear();
+        Ok(())
+    }
+}
+
+fn put_plan(to: &mut Vec<u8>, plan: &ValidPlan) {
+    let head = PlanRecord::from(plan);
+    put(to, Tag::Plan, &[bytemuck::bytes_of(&head), bytemuck::cast_slice(plan.knots())]);
+}
+
+#[cfg(test)]
+mod tests;
