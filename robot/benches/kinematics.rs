@@ -1,4 +1,5 @@
-//! Kinematics on one core: `cargo bench -p nullsweep-robot`.
+//! Kinematics on one core: `cargo bench -p nullsweep-robot`. The numeric solver on the same targets
+//! is the baseline of the closed form.
 
 use divan::{Bencher, black_box};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Solutions};
@@ -28,7 +29,7 @@ fn configurations(arm: &Arm) -> Vec<JointVector> {
     (0..COUNT).map(|_| one()).collect()
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn pr2_forward(bencher: Bencher<'_, '_>) {
     let arm = pr2();
     let qs = configurations(&arm);
@@ -39,7 +40,7 @@ fn pr2_forward(bencher: Bencher<'_, '_>) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn pr2_jacobian(bencher: Bencher<'_, '_>) {
     let arm = pr2();
     let qs = configurations(&arm);
@@ -50,7 +51,7 @@ fn pr2_jacobian(bencher: Bencher<'_, '_>) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn pr2_link_poses(bencher: Bencher<'_, '_>) {
     let arm = pr2();
     let qs = configurations(&arm);
@@ -62,7 +63,7 @@ fn pr2_link_poses(bencher: Bencher<'_, '_>) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn pr2_inverse_all_for_one_roll(bencher: Bencher<'_, '_>) {
     let arm = pr2();
     let qs = configurations(&arm);
@@ -77,7 +78,7 @@ fn pr2_inverse_all_for_one_roll(bencher: Bencher<'_, '_>) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn pr2_inverse_on_one_branch(bencher: Bencher<'_, '_>) {
     let arm = pr2();
     let qs = configurations(&arm);
@@ -95,5 +96,48 @@ fn pr2_inverse_on_one_branch(bencher: Bencher<'_, '_>) {
         i = (i + 1) % COUNT;
         let (target, q, branch) = black_box(&cases[i]);
         arm.ik().solve_on(*branch, target, q[2], q)
+    });
+}
+
+/// The same targets as [`pr2_inverse_all_for_one_roll`], by the solver for arms of any shape.
+#[divan::bench(sample_size = 10)]
+fn pr2_inverse_numeric_cold(bencher: Bencher<'_, '_>) {
+    let arm = pr2();
+    let numeric = arm.numeric_ik();
+    let qs = configurations(&arm);
+    let targets: Vec<_> = qs.iter().map(|q| (arm.tip_pose(q), q[2])).collect();
+    let mut out = Solutions::new();
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        let (target, roll) = black_box(&targets[i]);
+        numeric.solve(target, *roll, &mut out);
+        out.len()
+    });
+}
+
+/// One step along a path, a hundredth of a radian a joint, from the solution before.
+#[divan::bench(sample_size = 1000)]
+fn pr2_inverse_numeric_warm(bencher: Bencher<'_, '_>) {
+    let arm = pr2();
+    let numeric = arm.numeric_ik();
+    let mut out = Solutions::new();
+    let cases: Vec<_> = configurations(&arm)
+        .iter()
+        .filter(|q| arm.within_margins(q))
+        .filter_map(|q| {
+            let mut near = *q;
+            near.iter_mut().take(arm.dof()).for_each(|v| *v += 0.01);
+            numeric.solve(&arm.tip_pose(q), q[2], &mut out);
+            let close = |s: &&nullsweep_robot::Solution| (s.q[0] - q[0]).abs() < 1e-4;
+            let branch = out.iter().find(close)?.branch;
+            Some((arm.tip_pose(q), *q, near, branch))
+        })
+        .collect();
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % cases.len();
+        let (target, q, near, branch) = black_box(&cases[i]);
+        numeric.solve_on(*branch, target, q[2], near)
     });
 }

@@ -189,3 +189,32 @@ fn jacobian_is_the_derivative_of_the_pose() {
         }
     }
 }
+
+/// Two derivations, one answer: what the numeric solver finds for the PR2 is what the closed form
+/// says, and it finds nearly all of it.
+#[test]
+fn numeric_and_closed_form_agree_on_the_pr2() {
+    for side in [Side::Right, Side::Left] {
+        let arm = Robot::pr2().arm(&ArmSpec::pr2(side)).unwrap();
+        let numeric = arm.numeric_ik();
+        assert_eq!(numeric.redundant_joint(), arm.ik().redundant_joint());
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let (mut closed, mut found) = (Solutions::new(), Solutions::new());
+        let (mut both, mut all) = (0, 0);
+        for _ in 0..200 {
+            let q = random(&arm, &mut rng);
+            let target = arm.tip_pose(&q);
+            arm.ik().solve(&target, q[2], &mut closed);
+            numeric.solve(&target, q[2], &mut found);
+            for solution in &found {
+                assert!(closed.iter().any(|s| farthest(&s.q, &solution.q) < 1e-4), "{solution:?}");
+            }
+            for solution in closed.iter().filter(|s| arm.within_margins(&s.q)) {
+                all += 1;
+                both += usize::from(found.iter().any(|s| farthest(&s.q, &solution.q) < 1e-4));
+            }
+        }
+        println!("{side:?}: {both} of {all} solutions inside the margins found numerically");
+        assert!(both * 100 >= all * 97, "{both} of {all}");
+    }
+}

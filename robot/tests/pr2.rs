@@ -9,7 +9,7 @@ use common::{data, farthest, random};
 use flate2::read::GzDecoder;
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use nullsweep_robot::{
-    Arm, ArmSpec, InverseKinematics, JointVector, RedundantJoint, Robot, Side, Solutions,
+    Arm, ArmSpec, Branch, InverseKinematics, JointVector, RedundantJoint, Robot, Side, Solutions,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -196,5 +196,108 @@ fn one_branch_follows_a_path_without_a_jump() {
         }
         println!("{joint:?}: {followed} paths followed to their end, {ended} crossed a fold");
         assert!(followed > 100);
+    }
+}
+
+/// Every solution reaches the target, and there is at least one.
+fn check_reached(arm: &Arm, ik: &dyn InverseKinematics, q: &JointVector, within: f64) -> Solutions {
+    let target = arm.tip_pose(q);
+    let mut solutions = Solutions::new();
+    ik.solve(&target, q[ik.redundant_joint().unwrap()], &mut solutions);
+    assert!(!solutions.is_empty(), "{q:?}");
+    for s in &solutions {
+        assert!(s.q.iter().all(|v| v.is_finite()), "{s:?}");
+        let off = (arm.tip_pose(&s.q).to_homogeneous() - target.to_homogeneous()).amax();
+        assert!(off < within, "{off} {q:?} {s:?}");
+        let alone = ik.solve_on(s.branch, &target, s.redundancy, q).unwrap();
+        let off = (arm.tip_pose(&alone.q).to_homogeneous() - target.to_homogeneous()).amax();
+        assert!(off < within, "{off} {q:?} {alone:?}");
+    }
+    solutions
+}
+
+#[test]
+fn singular_postures_are_solved() {
+    let arm = arm(Side::Right);
+    let generic = [-0.5, 0.4, -1.2, -1.3, 0.7, -1.1, 0.4, 0.0];
+    let with = |changes: &[(usize, f64)]| {
+        let mut q = generic;
+        for &(i, value) in changes {
+            q[i] = value;
+        }
+        q
+    };
+    for joint in [RedundantJoint::UpperArmRoll, RedundantJoint::ShoulderPan] {
+        let ik = arm.ik_by(joint).unwrap();
+        // The wrist straight, or folded back: one solution for both wrists, and its own roll kept
+        // by the branch that is followed.
+        for flex in [0.0, std::f64::consts::PI] {
+            let q = with(&[(5, flex)]);
+            let solutions = check_reached(&arm, ik, &q, 1e-9);
+            let straight = solutions.iter().find(|s| farthest(&s.q[..4], &q[..4]) < 1e-6).unwrap();
+            let near =
+                ik.solve_on(straight.branch, &arm.tip_pose(&q), straight.redundancy, &q).unwrap();
+            assert!(farthest(&near.q, &q) < 1e-6, "{near:?}");
+        }
+        // Nearly straight.
+        for flex in [1e-12, 1e-9, 3e-9, 1e-6, -1e-7] {
+            check_reached(&arm, ik, &with(&[(5, flex)]), 1e-8);
+        }
+        // The elbow straight, and nearly so.
+        for elbow in [0.0, -1e-12, -1e-9, -1e-7, -1e-4] {
+            check_reached(&arm, ik, &with(&[(3, elbow)]), 1e-7);
+        }
+        // Elbow and wrist straight.
+        check_reached(&arm, ik, &with(&[(3, 0.0), (5, 0.0)]), 1e-7);
+        // The roll at 0, where elbow and shoulder are in one plane, and at a quarter turn.
+        check_reached(&arm, ik, &with(&[(2, 0.0)]), 1e-9);
+        check_reached(&arm, ik, &with(&[(2, -std::f64::consts::FRAC_PI_2)]), 1e-7);
+    }
+}
+
+#[test]
+fn wrist_centre_on_the_pan_axis_keeps_its_pan() {
+    let arm = arm(Side::Right);
+    // With the roll at 0 the arm folds in its own plane; the elbow that brings the wrist centre over
+    // the pan axis.
+    let (a, l1, l2, lift) = (0.1, 0.4, 0.321, 1.2f64);
+    let out = |elbow: f64| a + l1 * lift.cos() + l2 * (lift + elbow).cos();
+    let (mut low, mut high) = (0.5, 1.9);
+    assert!(out(low) > 0.0 && out(high) < 0.0);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if out(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    let q = [-0.4, lift, 0.0, low, 0.3, -0.8, 0.2, 0.0];
+    let target = arm.tip_pose(&q);
+    let solutions = check_reached(&arm, arm.ik(), &q, 1e-7);
+    let found = solutions
+        .iter()
+        .filter_map(|s| arm.ik().solve_on(s.branch, &target, 0.0, &q))
+        .any(|s| farthest(&s.q, &q) < 1e-6);
+    assert!(found, "{solutions:?}");
+}
+
+#[test]
+fn unreachable_and_broken_targets_have_no_solution() {
+    let arm = arm(Side::Right);
+    let mut out = Solutions::new();
+    let near = arm.home();
+    for joint in [RedundantJoint::UpperArmRoll, RedundantJoint::ShoulderPan] {
+        let ik = arm.ik_by(joint).unwrap();
+        let mut far = arm.tip_pose(&near);
+        far.translation.x += 1.0;
+        for (target, value) in [
+            (far, -1.0),
+            (Isometry3::translation(f64::NAN, 0.0, 0.0), -1.0),
+            (Isometry3::translation(f64::INFINITY, 0.0, 0.0), -1.0),
+            (arm.tip_pose(&near), f64::NAN),
+        ] {
+            ik.solve(&target, value, &mut out);
+            assert!(out.is_empty(), "{out:?}");
+            for branch in 0..=u8::MAX {
+                assert!(ik.solve_on(Branch(branch), &target, value, &near).is_none());
+            }
+        }
     }
 }

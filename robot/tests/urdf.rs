@@ -6,6 +6,8 @@ use nalgebra::{Isometry3, Vector3};
 use nullsweep_robot::{
     ArmError, ArmSpec, Geometry, JointKind, JointLimits, Robot, Side, Solutions, UrdfError,
 };
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// A robot from links and joints.
 fn robot(links: &str, joints: &str) -> Result<Robot, UrdfError> {
@@ -195,6 +197,11 @@ fn mimic_joints_follow_and_are_not_held() {
     assert!(matches!(arm.with_held(&[("left", f64::NAN)]), Err(ArmError::HeldOutside { .. })));
     assert!(matches!(robot.arm(&spec("base", "r")), Err(ArmError::MimicInChain { .. })));
 
+    let moved = joint("lift", "revolute", "base", "r", &format!("{LIMIT}<mimic joint='arm'/>"))
+        + &joint("arm", "revolute", "r", "l", LIMIT);
+    let moved = self::robot("base l r", &moved).unwrap();
+    assert!(matches!(moved.arm(&spec("r", "l")), Err(ArmError::MimicInChain { .. })));
+
     let circle = joint("a", "revolute", "base", "l", &format!("{LIMIT}<mimic joint='b'/>"))
         + &joint("b", "revolute", "base", "r", &format!("{LIMIT}<mimic joint='a'/>"));
     let error = self::robot("base l r", &circle).unwrap_err();
@@ -307,4 +314,44 @@ fn shape_is_recognised_in_other_frames() {
             assert!(nearest < 1e-5, "{nearest} {q:?}");
         }
     }
+}
+
+/// Damaged text ends in an error or a robot, never in a panic.
+#[test]
+fn damaged_text_does_not_panic() {
+    let text = include_str!("../pr2.urdf");
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut refused = 0;
+    for _ in 0..400 {
+        let mut bytes = text.as_bytes().to_vec();
+        for _ in 0..rng.random_range(1..4) {
+            let at = rng.random_range(0..bytes.len());
+            match rng.random_range(0..4) {
+                0 => bytes.truncate(at.max(1)),
+                1 => bytes[at] = b"<>\"/-e 0\0"[rng.random_range(0..9)],
+                2 => drop(bytes.drain(at..(at + rng.random_range(1..60)).min(bytes.len()))),
+                _ => {
+                    let end = (at + rng.random_range(1..300)).min(bytes.len());
+                    let copy = bytes[at..end].to_vec();
+                    bytes.splice(at..at, copy);
+                }
+            }
+            if bytes.is_empty() {
+                break;
+            }
+        }
+        let text = String::from_utf8_lossy(&bytes);
+        match Robot::from_urdf_str(&text) {
+            Ok(robot) => {
+                if let Ok(arm) = robot.arm(&ArmSpec::pr2(Side::Right)) {
+                    assert!(arm.dof() <= 8);
+                }
+            }
+            Err(error) => {
+                assert!(!error.to_string().is_empty());
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 100, "{refused}");
 }

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, SMatrix};
 
 use crate::chain::Chain;
 use crate::fingerprint::fingerprint;
-use crate::ik::{InverseKinematics, RedundantJoint, Solvers};
+use crate::ik::{InverseKinematics, Numeric, RedundantJoint, Solvers};
 use crate::limits::{JointLimits, LimitsError, apply_toml};
 use crate::urdf::{Joint, JointKind, Model, Robot};
 use crate::{JointVector, MAX_DOF, pr2};
@@ -257,6 +257,13 @@ impl Arm {
         self.solvers.by(joint)
     }
 
+    /// The numeric solver whatever the arm's shape: a second opinion on the closed form. Making it
+    /// takes some milliseconds.
+    #[must_use]
+    pub fn numeric_ik(&self) -> Box<dyn InverseKinematics> {
+        Box::new(Numeric::new(&self.chain, &self.limits, &self.margined))
+    }
+
     /// Same kinematics as the PR2's and its joint names.
     fn is_pr2(&self) -> bool {
         self.solvers.closed_form() && self.names.iter().all(|n| pr2::ready(n).is_some())
@@ -324,6 +331,19 @@ fn active_joints(robot: &Robot, spec: &ArmSpec) -> Result<Vec<usize>, ArmError> 
         link = joint.parent;
     }
     active.reverse();
+    // A joint below the base that follows one of the arm's would move the base.
+    while let Some(index) = model.links[link].parent_joint {
+        let source = |mut index: usize| {
+            while let Some(mimic) = model.joints[index].mimic {
+                index = mimic.joint;
+            }
+            index
+        };
+        if active.contains(&source(index)) {
+            return Err(ArmError::MimicInChain { joint: model.joints[index].name.clone() });
+        }
+        link = model.joints[index].parent;
+    }
     if active.is_empty() {
         return Err(ArmError::NoJoints { base: base_name, tip: tip_name });
     }

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Vector3};
 use wide::f64x4;
 
-use super::lanes::Real;
+use super::lanes::{Real, unit};
 use super::shape::Pr2Shape;
 use super::{Branch, InverseKinematics, Solution, Solutions};
 use crate::JointVector;
@@ -96,7 +96,7 @@ impl<F: Family> InverseKinematics for ClosedForm<F> {
         let angles = wrist.angles();
         let arm = forearm.angles.map(f64x4::to_array);
         let [first, flex, last] = angles.map(f64x4::to_array);
-        let sine = wrist.flex.0.to_array();
+        let bend = wrist.bend().to_array();
         for bits in 0..4 {
             if choices[bits].is_none() || !self.family.is_distinct(&prepared, bits as u8) {
                 continue;
@@ -108,7 +108,7 @@ impl<F: Family> InverseKinematics for ClosedForm<F> {
                 // Eight at most, which is less than the capacity.
                 let _ = out.push(Solution { q, branch, redundancy });
             };
-            if sine[bits] < STRAIGHT {
+            if bend[bits] < STRAIGHT {
                 push(wrist.lane(bits).straight(0.0), 0);
             } else {
                 push([first[bits], flex[bits], last[bits]], 0);
@@ -134,7 +134,7 @@ impl<F: Family> InverseKinematics for ClosedForm<F> {
         let choice = self.family.choose(&prepared, branch.0 & 3, free)?;
         let forearm = self.family.forearm(&prepared, choice, free);
         let wrist = Wrist::new(&axes(&forearm.sines), &target.axes);
-        let turned = if wrist.flex.0 < STRAIGHT {
+        let turned = if wrist.bend() < STRAIGHT {
             wrist.straight(self.shape.canonical(6, near[6]))
         } else {
             let [first, flex, last] = wrist.angles();
@@ -165,63 +165,62 @@ fn axes<T: Real>(sines: &[(T, T); 4]) -> [[T; 3]; 3] {
     [mix(c4, -s4), side, mix(s4, c4)]
 }
 
-/// The last three joints, W = Rx(q₅)·Ry(q₆)·Rx(q₇), by the entries of W.
+/// The last three joints, W = Rx(q₅)·Ry(q₆)·Rx(q₇), by the columns of W.
 struct Wrist<T> {
-    /// Sine (not negative) and cosine of the flex.
-    flex: (T, T),
-    /// W₁₀, −W₂₀: sine and cosine of the forearm roll, times the sine of the flex.
-    first: (T, T),
-    /// W₀₁, W₀₂: likewise of the wrist roll.
-    last: (T, T),
-    /// W₂₁, W₁₁: where the flex is 0 or π, sine and cosine of the sum or difference of both rolls.
-    sum: (T, T),
+    columns: [[T; 3]; 3],
 }
 
 impl<T: Real> Wrist<T> {
     #[inline]
     fn new(forearm: &[[T; 3]; 3], wrist: &[Vector3<f64>; 3]) -> Self {
-        let entry = |row: usize, column: usize| {
-            let (f, w) = (&forearm[row], &wrist[column]);
+        let entry = |f: &[T; 3], w: &Vector3<f64>| {
             f[0] * T::splat(w.x) + f[1] * T::splat(w.y) + f[2] * T::splat(w.z)
         };
-        let last = (entry(0, 1), entry(0, 2));
         Self {
-            flex: ((last.0 * last.0 + last.1 * last.1).sqrt(), entry(0, 0)),
-            first: (entry(1, 0), -entry(2, 0)),
-            last,
-            sum: (entry(2, 1), entry(1, 1)),
+            columns: std::array::from_fn(|c| {
+                std::array::from_fn(|r| entry(&forearm[r], &wrist[c]))
+            }),
         }
+    }
+
+    /// |sin q₆|, from W₁₀ = sin q₅ sin q₆ and W₂₀ = −cos q₅ sin q₆.
+    #[inline]
+    fn bend(&self) -> T {
+        let [_, y, z] = self.columns[0];
+        (y * y + z * z).sqrt()
     }
 
     /// Forearm roll, wrist flex (not negative) and wrist roll. The other way to the same rotation
     /// is half a turn of both rolls and the negative flex.
     #[inline]
     fn angles(&self) -> [T; 3] {
-        [
-            self.first.0.atan2(self.first.1),
-            self.flex.0.atan2(self.flex.1),
-            self.last.0.atan2(self.last.1),
-        ]
+        let [x, y, z] = self.columns[0];
+        let first = unit(y, -z);
+        [first.0.atan2(first.1), self.bend().atan2(x), self.last(first)]
+    }
+
+    /// The wrist roll that goes with a forearm roll (sine, cosine), from Rx(−q₅)·W. However loose
+    /// the forearm roll is near a straight wrist, the two together give W.
+    #[inline]
+    fn last(&self, (sin, cos): (T, T)) -> T {
+        let [_, y, z] = [0, 1, 2].map(|i| self.columns[i]);
+        (-(cos * z[1] + sin * z[2])).atan2(cos * y[1] + sin * y[2])
     }
 }
 
 impl Wrist<f64x4> {
     fn lane(&self, i: usize) -> Wrist<f64> {
-        let pick = |(a, b): (f64x4, f64x4)| (a.to_array()[i], b.to_array()[i]);
-        Wrist {
-            flex: pick(self.flex),
-            first: pick(self.first),
-            last: pick(self.last),
-            sum: pick(self.sum),
-        }
+        Wrist { columns: self.columns.map(|column| column.map(|entry| entry.to_array()[i])) }
     }
 }
 
 impl Wrist<f64> {
     /// The angles of a straight (or folded) wrist whose own roll is kept.
     fn straight(&self, last: f64) -> [f64; 3] {
-        let sum = self.sum.0.atan2(self.sum.1);
-        let (ahead, flex) = (self.flex.1 > 0.0, self.flex.0.atan2(self.flex.1));
-        [if ahead { sum - last } else { sum + last }, flex, last]
+        let [x, y, _] = [0, 1, 2].map(|i| self.columns[i]);
+        // W₂₁ and W₁₁: sine and cosine of the sum of both rolls, or, folded, of their difference.
+        let sum = y[2].atan2(y[1]);
+        let first = if x[0] > 0.0 { sum - last } else { sum + last };
+        [first, self.bend().atan2(x[0]), self.last(first.sin_cos())]
     }
 }

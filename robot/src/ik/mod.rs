@@ -16,7 +16,7 @@ use crate::JointVector;
 use crate::chain::Chain;
 use crate::limits::JointLimits;
 use closed::ClosedForm;
-use numeric::Numeric;
+pub(crate) use numeric::Numeric;
 use pan::ShoulderPan;
 use roll::UpperArmRoll;
 use shape::Pr2Shape;
