@@ -89,7 +89,8 @@ struct RunArgs {
     /// How far a plan's first knot may be from where the arm holds. [rad]
     #[arg(long, default_value_t = 0.02)]
     start_tolerance: f64,
-    /// How far a held joint (torso, other arm) may be from where a plan takes it. [rad or m]
+    /// How far a held joint (torso, other arm) may be from where a plan takes it; twice that far
+    /// it may move while the plan runs. [rad or m]
     #[arg(long, default_value_t = 0.01)]
     held_tolerance: f64,
     /// Following error that is allowed at stand-still. [rad]
@@ -234,6 +235,7 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         start_tolerance: positive("--start-tolerance", args.start_tolerance)?,
         stale_ns: nanos("--stale-ms", args.stale_ms)?,
         lost_ns: nanos("--lost-ms", args.lost_ms)?,
+        held_drift: 2.0 * positive("--held-tolerance", args.held_tolerance)?,
         following_error: positive("--following-error", args.following_error)?,
         following_lag: args.following_lag.max(0.0),
         min_rate: args.min_rate.clamp(0.0, 1.0) * rate,

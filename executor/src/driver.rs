@@ -2,16 +2,18 @@
 //! command, hand on. Generic over the endpoint and given its time, so it runs on a virtual clock
 //! as well.
 
+use core::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use nullsweep_ipc_types::ports::now_ns;
 use nullsweep_ipc_types::{
-    HISTOGRAM_BUCKETS, JointStates, MAX_HELD_JOINTS, MAX_JOINTS, Mode, Setpoint, bucket_upper_ns,
+    HISTOGRAM_BUCKETS, JointStates, MAX_HELD_JOINTS, MAX_JOINTS, Mode, PlanId, Setpoint,
+    bucket_upper_ns,
 };
 
 use crate::MAX_DOF;
 use crate::admit::Held;
-use crate::cycle::{Input, Measured, State, Target, step};
+use crate::cycle::{HELD_MOVED, Input, Measured, State, Target, step};
 use crate::guard::Guard;
 use crate::hardware::Hardware;
 use crate::record::Tape;
@@ -29,6 +31,8 @@ pub struct Driver<H> {
     state: State,
     slots: Arc<Slots>,
     tape: Option<Arc<Tape>>,
+    /// Where the held joints stood when the motion began.
+    reference: Option<Held>,
     lateness: [u32; HISTOGRAM_BUCKETS],
     compute: [u32; HISTOGRAM_BUCKETS],
     cycles: u64,
@@ -45,6 +49,7 @@ impl<H: Hardware> Driver<H> {
             state: State::default(),
             slots,
             tape: None,
+            reference: None,
             lateness: [0; HISTOGRAM_BUCKETS],
             compute: [0; HISTOGRAM_BUCKETS],
             cycles: 0,
@@ -87,12 +92,18 @@ impl<H: Hardware> Driver<H> {
             self.failures += 1;
             None
         });
-        if let Some(states) = &states {
-            self.slots.held.force_push(held(states));
-        }
+        let measured = states.as_ref().map(|states| {
+            let held = held(states);
+            self.slots.held.force_push(held);
+            let mut measured = measured(states);
+            if self.has_moved(held) {
+                measured.status |= HELD_MOVED;
+            }
+            measured
+        });
         let room = self.slots.has_room_for_events();
         let input = Input {
-            measured: states.as_ref().map(measured),
+            measured,
             ask: self.slots.asks.pop(),
             offer: if room { self.slots.offers.pop() } else { None },
             missed: wake.missed,
@@ -141,6 +152,25 @@ impl<H: Hardware> Driver<H> {
         count(&mut self.compute, done.saturating_sub(wake.now_ns));
     }
 
+    /// Whether a held joint has moved since the motion began.
+    fn has_moved(&mut self, held: Held) -> bool {
+        let resting = self.state.snapshot().plan == PlanId::NONE;
+        match &self.reference {
+            Some(reference) if !resting => {
+                let bound = self.guard.held_drift;
+                reference.count != held.count
+                    || reference.positions[..held.count]
+                        .iter()
+                        .zip(&held.positions)
+                        .any(|(then, now)| !(turned(*then, *now) <= bound))
+            }
+            _ => {
+                self.reference = Some(held);
+                false
+            }
+        }
+    }
+
     fn setpoint(&self, target: &Target, wake: Wake) -> Setpoint {
         Setpoint {
             sequence: target.sequence,
@@ -172,8 +202,15 @@ fn measured(states: &JointStates) -> Measured {
         setpoint_sequence: states.setpoint_sequence,
         joint_count: states.joint_count as usize,
         q,
-        status: states.status,
+        status: states.status & !HELD_MOVED,
     }
+}
+
+/// The distance of two positions, where a whole turn is none: no other joint can move that far
+/// between two states.
+fn turned(from: f64, to: f64) -> f64 {
+    let apart = (to - from).abs();
+    if apart > PI { (apart - TAU).abs() } else { apart }
 }
 
 fn held(states: &JointStates) -> Held {
@@ -185,4 +222,54 @@ fn count(histogram: &mut [u32; HISTOGRAM_BUCKETS], value_ns: u64) {
     let last = HISTOGRAM_BUCKETS - 1;
     let bucket = (0..last).find(|b| value_ns < bucket_upper_ns(*b)).unwrap_or(last);
     histogram[bucket] = histogram[bucket].saturating_add(1);
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+    use nullsweep_ipc_types::{EventKind, Fault, JoinRule, Reason, status};
+
+    use super::*;
+    use crate::guard::tests::pr2;
+    use crate::hardware::Loopback;
+    use crate::testing::{HOME, MS, moved, plan};
+
+    /// A held joint that moves while a plan runs stops the arm on its path; a whole turn, a small
+    /// drift, or a move at rest does not.
+    #[test]
+    fn a_moving_torso_stops_the_arm() {
+        for (by, stops) in [(0.015, false), (TAU, false), (0.05, true), (f64::NAN, true)] {
+            let guard = pr2();
+            let slots = Arc::new(Slots::default());
+            let mut states = JointStates {
+                joint_count: 7,
+                held_count: 2,
+                status: status::CALIBRATED,
+                stamp_ns: 1,
+                ..JointStates::zeroed()
+            };
+            states.positions[..MAX_DOF].copy_from_slice(&HOME);
+            let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
+            let mut run = |cycles: std::ops::Range<u64>, torso: f64| {
+                for cycle in cycles {
+                    driver.hardware().state.held_positions[1] = torso;
+                    driver.cycle(Wake { deadline_ns: cycle * MS, now_ns: cycle * MS, missed: 0 });
+                }
+            };
+            run(1..10, 0.0);
+            run(10..20, 0.3);
+            let points = [(0, HOME), (400 * MS, moved(HOME, 0, 0.4))];
+            slots.offers.push(plan(&guard, 1, JoinRule::StopThenStart, &points)).unwrap();
+            run(20..120, 0.3);
+            run(120..600, 0.3 + by);
+            let end = std::iter::from_fn(|| slots.events.pop()).last().unwrap();
+            if stops {
+                assert_eq!((end.kind, end.why.reason), (EventKind::Aborted, Reason::HeldJoint));
+                assert_eq!(driver.state().snapshot().fault, Fault::HeldJoint);
+            } else {
+                assert_eq!(end.kind, EventKind::Finished, "{by}");
+            }
+            assert_eq!(driver.mode(), Mode::Hold, "{by}");
+        }
+    }
 }

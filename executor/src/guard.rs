@@ -65,6 +65,8 @@ pub struct Guard {
     pub stale_ns: u64,
     /// Age of the joint state at which communication counts as lost. \[ns\]
     pub lost_ns: u64,
+    /// How far a held joint (torso, other arm) may move while a plan runs. \[rad\] or \[m\]
+    pub held_drift: f64,
     /// Following error that is allowed at stand-still. \[rad\]
     pub following_error: f64,
     /// Following error that is allowed for each unit of commanded speed. \[s\]
@@ -104,6 +106,7 @@ impl Guard {
             join_tolerance: 1e-9,
             stale_ns: 20_000_000,
             lost_ns: 100_000_000,
+            held_drift: 0.02,
             following_error: 0.1,
             following_lag: 0.15,
             debounce: 20,

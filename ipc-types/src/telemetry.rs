@@ -53,6 +53,8 @@ wire_enum! {
         JointCount = 11 => "the joint state has another number of joints",
         /// An operator asked for a stop.
         Operator = 12 => "stopped by the operator",
+        /// A joint that the running plan takes as fixed has moved: the arm was stopped on its path.
+        HeldJoint = 13 => "a held joint has moved",
     }
 }
 

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | Init | a fresh, finite state of a calibrated, running endpoint, and commanded = measured → Hold |
 //! | Hold | an accepted plan → Executing |
-//! | Executing | last knot → Hold or the next plan; pause → Paused; stop, stale state → Stopping |
+//! | Executing | last knot → Hold or the next plan; pause → Paused; stop, stale state, moved held joint → Stopping |
 //! | Paused | resume → Executing; stop → Stopping |
 //! | Stopping | stand-still → Hold, or Executing the plan that was waited for |
 //! | Fault | reset (or resume after a halt), once the cause is gone → Init |
@@ -35,7 +35,7 @@ use crate::path::Path;
 
 pub use checkpoint::{Checkpoint, MeasuredRecord};
 pub use command::{Ask, Order, Reply};
-pub use supervise::Measured;
+pub use supervise::{HELD_MOVED, Measured};
 
 /// Plans that may wait behind the running one.
 pub const WAITING: usize = 4;
@@ -125,8 +125,8 @@ enum StopCause {
     Replace,
     /// By an operator's order.
     Operator,
-    /// The joint state is stale.
-    Stale,
+    /// The joint state is stale, or a held joint has moved.
+    Lapse(Reason),
     /// The executor shuts down.
     Shutdown,
 }

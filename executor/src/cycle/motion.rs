@@ -104,7 +104,8 @@ impl State {
             Some(StopCause::Replace) => (EventKind::Superseded, Reason::None),
             Some(StopCause::Operator) => (EventKind::Aborted, Reason::Stopped),
             Some(StopCause::Shutdown) => (EventKind::Aborted, Reason::Shutdown),
-            Some(StopCause::Stale) | None => (EventKind::Aborted, Reason::Fault),
+            Some(StopCause::Lapse(why)) => (EventKind::Aborted, why),
+            None => (EventKind::Aborted, Reason::Fault),
         };
         self.end_path(kind, why, out);
         self.drop_path(out);

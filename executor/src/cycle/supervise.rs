@@ -24,9 +24,13 @@ pub struct Measured {
     pub joint_count: usize,
     /// Measured positions. \[rad\] or \[m\]
     pub q: Joints,
-    /// Bits of [`status`].
+    /// Bits of [`status`], and [`HELD_MOVED`].
     pub status: u32,
 }
+
+/// Set in [`Measured::status`] while a held joint is not where it was when the motion began. The
+/// endpoint has no say in this bit.
+pub const HELD_MOVED: u32 = 1 << 31;
 
 /// What supervision remembers.
 #[derive(Clone, Debug, Default)]
@@ -140,7 +144,11 @@ impl State {
                 if let Some((fault, reaction)) = fault {
                     self.fail(fault, reaction, out);
                 } else if age >= guard.stale_ns && self.path.is_some() {
-                    self.stop_for_stale_state(out);
+                    self.lapse(Fault::StaleState, Reason::Fault, out);
+                } else if measured.is_some_and(|m| m.status & HELD_MOVED != 0)
+                    && self.path.is_some()
+                {
+                    self.lapse(Fault::HeldJoint, Reason::HeldJoint, out);
                 }
                 self.follow_if_limp(guard);
             }
@@ -225,15 +233,16 @@ impl State {
         self.v = [0.0; MAX_DOF];
     }
 
-    fn stop_for_stale_state(&mut self, out: &mut Output) {
+    /// What the motion relies on is gone: it stops on its path, and nothing is latched.
+    fn lapse(&mut self, fault: Fault, why: Reason, out: &mut Output) {
         match self.stop {
             Some(StopCause::Replace) | None => {
-                self.end_waiting(EventKind::Aborted, Reason::Fault, out);
-                self.stop = Some(StopCause::Stale);
+                self.end_waiting(EventKind::Aborted, why, out);
+                self.stop = Some(StopCause::Lapse(why));
                 self.mode = Mode::Stopping;
-                self.fault = Fault::StaleState;
+                self.fault = fault;
             }
-            Some(StopCause::Operator | StopCause::Stale | StopCause::Shutdown) => {}
+            Some(StopCause::Operator | StopCause::Lapse(_) | StopCause::Shutdown) => {}
         }
     }
 
