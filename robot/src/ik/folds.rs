@@ -8,8 +8,6 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Matrix6;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use crate::chain::Chain;
 use crate::{Jacobian, JointVector, MAX_DOF};
@@ -39,12 +37,7 @@ impl Folds {
         if folds.columns.len() != 6 {
             return folds;
         }
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let others: Vec<JointVector> = (0..SAMPLES)
-            .map(|_| {
-                std::array::from_fn(|i| if i < chain.dof() { PI * uniform(&mut rng) } else { 0.0 })
-            })
-            .collect();
+        let others: Vec<JointVector> = (0..SAMPLES).map(|k| sample(chain, k)).collect();
         for &joint in &folds.columns.clone() {
             if chain.steps[joint].prismatic {
                 continue;
@@ -148,11 +141,9 @@ impl Folds {
 /// Share of the arm's self-motion that each joint takes, averaged over sampled configurations of
 /// an arm with one joint more than a pose has freedoms; sums to about 1.
 pub(super) fn self_motion(chain: &Chain) -> [f64; MAX_DOF] {
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut shares = [0.0; MAX_DOF];
-    for _ in 0..SAMPLES {
-        let q = std::array::from_fn(|i| if i < chain.dof() { PI * uniform(&mut rng) } else { 0.0 });
-        let (_, jacobian) = chain.jacobian(&q);
+    for k in 0..SAMPLES {
+        let (_, jacobian) = chain.jacobian(&sample(chain, k));
         // By Cramer's rule, joint i moves with the determinant of all other columns.
         let minors: [f64; MAX_DOF] = std::array::from_fn(|i| {
             if i >= chain.dof() {
@@ -169,9 +160,24 @@ pub(super) fn self_motion(chain: &Chain) -> [f64; MAX_DOF] {
     shares
 }
 
-/// Uniform in −1 … 1.
-pub(super) fn uniform(rng: &mut impl Rng) -> f64 {
-    (rng.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+/// The k-th configuration of a sequence that fills −π … π of each joint evenly.
+fn sample(chain: &Chain, k: usize) -> JointVector {
+    std::array::from_fn(|i| if i < chain.dof() { PI * (2.0 * spread(k, i) - 1.0) } else { 0.0 })
+}
+
+/// The k-th number of the van der Corput sequence to the base of a joint (Halton's sequence over
+/// all joints), in (0, 1): even coverage without a random generator.
+pub(super) fn spread(k: usize, joint: usize) -> f64 {
+    const PRIMES: [usize; MAX_DOF] = [2, 3, 5, 7, 11, 13, 17, 19];
+    // The first numbers of the larger bases rise together, so the sequence begins later.
+    let (mut k, base) = (k + 20, PRIMES[joint]);
+    let (mut value, mut weight) = (0.0, 1.0 / base as f64);
+    while k > 0 {
+        value += (k % base) as f64 * weight;
+        k /= base;
+        weight /= base as f64;
+    }
+    value
 }
 
 /// Whether two configurations are one, by whole turns.

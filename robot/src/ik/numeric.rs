@@ -10,10 +10,8 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Vector3, Vector6};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
 
-use super::folds::{Folds, MOST_FOLDS, same, self_motion, uniform};
+use super::folds::{Folds, MOST_FOLDS, same, self_motion, spread};
 use super::{Branch, InverseKinematics, Solution, Solutions};
 use crate::chain::Chain;
 use crate::limits::{JointLimits, unwrap_near, wrap};
@@ -63,17 +61,16 @@ const SIGNS: u8 = 0b1_1111;
 impl Numeric {
     pub(crate) fn new(chain: &Chain, limits: &[JointLimits], margined: &[(f64, f64)]) -> Self {
         let redundant = redundant_joint(chain);
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let start = |_| {
+        let seed = |k| {
             let mut q = [0.0; MAX_DOF];
             for (i, &(lower, upper)) in margined.iter().enumerate() {
                 let (lower, upper) = if lower.is_finite() { (lower, upper) } else { (-PI, PI) };
-                q[i] = lower + (upper - lower) * 0.5 * (1.0 + uniform(&mut rng));
+                q[i] = lower + (upper - lower) * spread(k, i);
             }
             q
         };
         Self {
-            seeds: (0..SEEDS).map(start).collect(),
+            seeds: (0..SEEDS).map(seed).collect(),
             folds: Folds::of(chain, redundant),
             chain: chain.clone(),
             limits: limits.to_vec(),
