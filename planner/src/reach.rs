@@ -163,8 +163,7 @@ pub fn reach(
             let found = (0..HEADINGS).find_map(|h| {
                 let heading = turn * h as f64 / HEADINGS as f64;
                 let travel = direction(&patch.normal, heading);
-                let pose =
-                    contact_pose(&patch.centre, &patch.normal, &travel, cell.tool.stand_off);
+                let pose = contact_pose(&patch.centre, &patch.normal, &travel, cell.tool.stand_off);
                 cell.first_sample(&pose, heading, &values)
             });
             tick();
@@ -199,7 +198,8 @@ mod tests {
     fn heading_and_direction_are_inverse() {
         for k in 0..40 {
             let a = f64::from(k);
-            let normal = UnitVector3::new_normalize(Vector3::new(a.sin(), (a * 1.7).cos(), 0.9 - 0.05 * a));
+            let normal =
+                UnitVector3::new_normalize(Vector3::new(a.sin(), (a * 1.7).cos(), 0.9 - 0.05 * a));
             let heading = (a * 0.37).rem_euclid(6.0) - 3.0;
             let d = direction(&normal, heading);
             assert!((heading_of(&normal, &d) - heading).abs() < 1e-12);

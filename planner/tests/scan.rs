@@ -213,6 +213,27 @@ fn a_flat_cloud_of_one_line_is_no_surface() {
     assert!(matches!(result, Err(ScanError::NoSurface { .. })));
 }
 
+#[test]
+fn a_region_keeps_its_density_in_a_large_scene() {
+    let view = simulate::chair(4);
+    let (placed, _) = scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose));
+    let seat = simulate::chair_seat();
+    let config = CleanConfig { max_points: 20_000, ..CleanConfig::default() };
+    let region = scan::clean_region(&placed, &seat, &config).unwrap();
+    assert!(region.report.voxel < 0.006, "voxel {}", region.report.voxel);
+    assert!(region.surface.points.iter().all(|p| seat.contains(p)));
+    assert!(region.surface.points.len() > 5_000);
+    // The level plate is level up to its borders: they were smoothed with what lies beyond.
+    let tilted = region.surface.normals.iter().filter(|n| n.z < 0.9).count();
+    assert!(tilted < region.surface.points.len() / 5, "{tilted} normals lean");
+    assert!(region.surroundings.iter().all(|p| !seat.contains(p)));
+    assert!((300..6_000).contains(&region.surroundings.len()), "{}", region.surroundings.len());
+
+    let nowhere = "5,5,5,6,6,6".parse().unwrap();
+    let error = scan::clean_region(&placed, &nowhere, &config).unwrap_err();
+    assert!(matches!(error, ScanError::EmptyCrop { .. }), "{error}");
+}
+
 mod hostile_bytes {
     use super::*;
     use proptest::prelude::*;

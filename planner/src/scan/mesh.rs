@@ -206,3 +206,101 @@ impl Soup {
         self.parsed.triangles.push(triangle);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::ScanError;
+    use super::super::read::{Format, RawScan, read_bytes};
+    use super::*;
+
+    /// The corners and outward triangles of a box of 0.3 × 0.2 × 0.1 m.
+    fn brick() -> (Vec<[f32; 3]>, Vec<[usize; 3]>) {
+        let corner =
+            |i: usize| [0.3 * (i & 1) as f32, 0.2 * (i >> 1 & 1) as f32, 0.1 * (i >> 2) as f32];
+        let quads =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        ((0..8).map(corner).collect(), triangles)
+    }
+
+    fn read(bytes: &[u8], format: Format) -> Result<RawScan, ScanError> {
+        read_bytes(bytes, format, Path::new("brick"), &ReadOptions::default())
+    }
+
+    fn check(raw: &RawScan) {
+        let area = 2.0 * (0.3 * 0.2 + 0.3 * 0.1 + 0.2 * 0.1);
+        let expected = area / 0.003f64.powi(2);
+        let count = raw.points.len() as f64;
+        assert!((count - expected).abs() <= 2.0, "{count} points, {expected} expected");
+        let normals = raw.normals.as_ref().expect("faces have normals");
+        let mut top = 0;
+        for (p, n) in raw.points.iter().zip(normals) {
+            let size = Vector3::new(0.3, 0.2, 0.1);
+            let outermost = (0..3).any(|axis| {
+                let outside = if n[axis] > 0.5 { size[axis] } else { 0.0 };
+                n[axis].abs() > 0.999 && (p[axis] - outside).abs() < 1e-6
+            });
+            assert!(outermost, "{p} with normal {n:?}");
+            top += usize::from(n.z > 0.5);
+        }
+        let share = top as f64 / count;
+        assert!((share - 0.06 / area).abs() < 0.005, "{share} of the points are on top");
+    }
+
+    #[test]
+    fn one_brick_comes_out_of_every_mesh_format() {
+        let (corners, triangles) = brick();
+        let mut ascii = String::from("solid brick\n");
+        let mut binary = vec![b' '; 80];
+        binary.extend((triangles.len() as u32).to_le_bytes());
+        let mut obj = String::from("# brick\n");
+        let mut ply = format!(
+            "ply\nformat ascii 1.0\nelement face {}\nproperty list uchar int vertex_indices\n\
+             element vertex 8\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+            triangles.len()
+        );
+        for [a, b, c] in &triangles {
+            ascii += "facet normal 0 0 0\nouter loop\n";
+            binary.extend([0; 12]);
+            for corner in [a, b, c] {
+                let [x, y, z] = corners[*corner];
+                ascii += &format!("vertex {x} {y} {z}\n");
+                binary.extend([x, y, z].iter().flat_map(|v| v.to_le_bytes()));
+            }
+            ascii += "endloop\nendfacet\n";
+            binary.extend([0; 2]);
+            ply += &format!("3 {a} {b} {c}\n");
+        }
+        ascii += "endsolid brick\n";
+        for [x, y, z] in &corners {
+            obj += &format!("v {x} {y} {z}\n");
+            ply += &format!("{x} {y} {z}\n");
+        }
+        for [a, b, c] in &triangles {
+            obj += &format!("f {}/1 {}//2 -{}\n", a + 1, b + 1, corners.len() - c);
+        }
+        check(&read(ascii.as_bytes(), Format::Stl).unwrap());
+        check(&read(&binary, Format::Stl).unwrap());
+        check(&read(obj.as_bytes(), Format::Obj).unwrap());
+        check(&read(ply.as_bytes(), Format::Ply).unwrap());
+
+        let cut = read(&binary[..binary.len() - 1], Format::Stl).unwrap_err().to_string();
+        assert!(cut.starts_with("brick: byte 80: 12 facets of 50 bytes"), "{cut}");
+        let cut = read(&ascii.as_bytes()[..ascii.len() - 20], Format::Stl).unwrap_err();
+        assert!(cut.to_string().contains("endsolid"), "{cut}");
+        let wild = obj.replace("f 1/1", "f 9/1");
+        let error = read(wild.as_bytes(), Format::Obj).unwrap_err().to_string();
+        assert!(error.starts_with("brick: line 10: \"9/1\" names none of 8"), "{error}");
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_samples_and_a_large_mesh_is_thinned() {
+        let obj = b"v 0 0 0\nv 20 0 0\nv 20 20 0\nf 1 2 3\n";
+        let first = read(obj, Format::Obj).unwrap();
+        assert_eq!(first, read(obj, Format::Obj).unwrap());
+        assert_eq!(first.points.len(), MAX_SAMPLES as usize);
+        assert!(matches!(first.warnings[..], [ScanWarning::SpacingWidened { .. }]));
+    }
+}

@@ -17,6 +17,7 @@ mod pcd;
 mod place;
 mod ply;
 mod read;
+mod region;
 mod text;
 
 use nalgebra::{Isometry3, Point3, UnitVector3};
@@ -25,6 +26,7 @@ pub use clean::{CleanConfig, CleanReport, clean};
 pub use error::{Place, ScanError, ScanWarning};
 pub use place::{CropBox, PlacedScan, Placement, View, place};
 pub use read::{Format, RawScan, ReadOptions, read, read_bytes};
+pub use region::{Region, clean_region};
 
 /// A cleaned surface: points with unit normals in one frame.
 ///
