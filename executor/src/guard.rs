@@ -126,6 +126,28 @@ impl Guard {
         &self.joints[..self.dof.min(MAX_DOF)]
     }
 
+    /// How far two velocities may differ and still count as one: what the stop acceleration
+    /// changes in one cycle. \[rad/s\]
+    #[must_use]
+    pub fn velocity_tolerance(&self) -> f64 {
+        self.stop_acceleration * self.period()
+    }
+
+    /// Whether two velocities are one; else the first joint that differs, and by how much.
+    ///
+    /// # Errors
+    /// That joint and its difference. \[rad/s\]
+    pub fn matches_velocity(&self, a: &Joints, b: &Joints) -> Result<(), (usize, f64)> {
+        let bound = self.velocity_tolerance();
+        for j in 0..self.used().len() {
+            let step = (b[j] - a[j]).abs();
+            if !(step <= bound) {
+                return Err((j, step));
+            }
+        }
+        Ok(())
+    }
+
     /// The joint that is further than `tolerance` from `from`, the farthest one, and by how much.
     #[must_use]
     pub fn farthest(&self, from: &Joints, to: &Joints, tolerance: f64) -> Option<(usize, f64)> {

@@ -178,7 +178,7 @@ pub struct Rules {
 ///
 /// # Errors
 /// The first rule that it breaks, in this order: counts and enum values, checksum, epoch, robot,
-/// held joints, finite values, time order, soft limits, velocity.
+/// held joints, finite values, time order, soft limits and velocity, rest at the end.
 pub fn admit(
     header: &PlanHeader,
     knots: &[Knot],
@@ -204,6 +204,7 @@ pub fn admit(
     check_held(header, held, rules)?;
     let mut plan = ValidPlan { id: header.id, join, interpolation, knots: read(knots, joints)? };
     check_motion(&plan, &rules.guard)?;
+    check_end(&plan, &rules.guard)?;
     set_ramps(&mut plan, &rules.guard);
     Ok(plan)
 }
@@ -322,6 +323,20 @@ fn check_motion(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
         }
     }
     Ok(())
+}
+
+/// A curve must come to rest: after its last knot the arm holds.
+fn check_end(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
+    let Some(last) = plan.knots.last().filter(|_| plan.interpolation == Interpolation::Cubic)
+    else {
+        return Ok(());
+    };
+    guard.matches_velocity(&last.v, &[0.0; MAX_DOF]).map_err(|(joint, speed)| {
+        Rejection::new(Reason::Velocity)
+            .knot(plan.knots.len() - 1)
+            .joint(joint)
+            .value(speed, guard.velocity_tolerance())
+    })
 }
 
 /// Gives each knot the steepest change of rate that is safe from its segment to one cycle past

@@ -67,6 +67,16 @@ const SEALED: &[Case] = &[
         Some(6),
         Some(3),
     ),
+    (
+        "cubic that does not come to rest",
+        |h, k| {
+            h.interpolation = Interpolation::Cubic.wire();
+            k[4].velocities[2] = 0.02;
+        },
+        Reason::Velocity,
+        Some(2),
+        Some(4),
+    ),
     // Both knots are inside, but the curve swings out on its way.
     (
         "cubic swing",

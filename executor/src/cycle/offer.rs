@@ -6,10 +6,11 @@
 
 use std::sync::Arc;
 
-use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanId, Reason};
+use nullsweep_ipc_types::{EventKind, Fault, Interpolation, Mode, PlanId, Reason};
 
 use super::{Output, State, StopCause, Turn, Waiting};
 use crate::Joints;
+use crate::MAX_DOF;
 use crate::admit::{Join, Rejection, ValidPlan};
 use crate::guard::Guard;
 use crate::path::Path;
@@ -73,14 +74,18 @@ impl State {
         holds: &Joints,
         guard: &Guard,
     ) -> Result<(), Rejection> {
-        let first = plan.knots().first().map_or(*holds, |k| k.q);
-        match guard.farthest(holds, &first, guard.start_tolerance) {
-            None => Ok(()),
-            Some((joint, apart)) => Err(Rejection::new(Reason::Start)
-                .knot(0)
-                .joint(joint)
-                .value(apart, guard.start_tolerance)),
+        let Some(first) = plan.knots().first() else { return Ok(()) };
+        let start = Rejection::new(Reason::Start).knot(0);
+        if let Some((joint, apart)) = guard.farthest(holds, &first.q, guard.start_tolerance) {
+            return Err(start.joint(joint).value(apart, guard.start_tolerance));
         }
+        // A curve that is already under way at its first knot cannot start from a stand-still.
+        if plan.interpolation() == Interpolation::Cubic {
+            return guard.matches_velocity(&[0.0; MAX_DOF], &first.v).map_err(|(joint, step)| {
+                start.joint(joint).value(step, guard.velocity_tolerance())
+            });
+        }
+        Ok(())
     }
 
     /// When the plan's turn comes, `None` for at once.
@@ -144,16 +149,10 @@ impl State {
         if let Some((joint, apart)) = guard.farthest(&at.q, &first.q, guard.join_tolerance) {
             return Err(start.joint(joint).value(apart, guard.join_tolerance));
         }
-        // Curves that carry velocities must also meet in them, within one cycle's acceleration.
-        let cubic = nullsweep_ipc_types::Interpolation::Cubic;
-        if plan.interpolation() == cubic && path.plan().interpolation() == cubic {
-            let bound = guard.stop_acceleration * guard.period();
-            for j in 0..guard.dof {
-                let step = (first.v[j] - at.v[j]).abs();
-                if !(step <= bound) {
-                    return Err(start.joint(j).value(step, bound));
-                }
-            }
+        // Curves that carry velocities must also meet in them.
+        let curves = [plan, path.plan()].iter().all(|p| p.interpolation() == Interpolation::Cubic);
+        if curves && let Err((joint, step)) = guard.matches_velocity(&at.v, &first.v) {
+            return Err(start.joint(joint).value(step, guard.velocity_tolerance()));
         }
         Ok(())
     }

@@ -1,10 +1,12 @@
 //! States and events, the join rules, and supervision, on a virtual clock.
 
-use nullsweep_ipc_types::{EventKind, Fault, JoinRule, Mode, PlanId, Reason, Verdict, status};
+use nullsweep_ipc_types::{
+    EventKind, Fault, Interpolation, JoinRule, Mode, PlanId, Reason, Verdict, status,
+};
 
 use super::{Event, Measured, Order};
 use crate::guard::tests::pr2;
-use crate::testing::{HOME, MS, Sim, cubic, joining, moved, plan};
+use crate::testing::{HOME, MS, Sim, cubic, joining, moved, plan, plan_with};
 use crate::{Joints, MAX_DOF};
 use EventKind::{Aborted, Accepted, Finished, Rejected, Started, Superseded};
 
@@ -131,6 +133,40 @@ fn a_join_that_does_not_fit_leaves_the_plan_alone() {
     sim.run_until(Mode::Hold, 1000);
     assert_eq!(sim.story(1), [Accepted, Started, Finished]);
     assert_eq!(sim.last, Some(old[8].1));
+}
+
+#[test]
+fn curves_must_meet_in_velocity_too() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let points = line(HOME);
+    // Under way from the first knot on: not from a stand-still.
+    let running_start = |number, speed: f64, joined: Option<PlanId>| {
+        plan_with(&guard, number, &points, |h, knots| {
+            h.interpolation = Interpolation::Cubic.wire();
+            let last = knots.len() - 1;
+            for knot in &mut knots[..last] {
+                knot.velocities[0] = speed;
+            }
+            if let Some(joined) = joined {
+                for knot in knots {
+                    knot.positions[0] += 0.2;
+                }
+                h.join_rule = JoinRule::AtKnot.wire();
+                (h.join_plan, h.join_knot) = (joined, 4);
+            }
+        })
+    };
+    let why = only(&sim.offer(running_start(1, 1.0, None)), Rejected).why;
+    assert_eq!((why.reason, why.joint, why.value), (Reason::Start, 0, 1.0));
+    only(&sim.offer(cubic(&guard, 2, &points)), Accepted);
+    only(&sim.offer(running_start(3, 0.5, Some(id(2)))), Rejected);
+    only(&sim.offer(running_start(4, 1.0, Some(id(2)))), Accepted);
+    sim.top_acceleration = 0.0;
+    sim.run(198);
+    assert_eq!(sim.story(4), [Accepted, Started]);
+    assert!((sim.last_v[0] - 1.0).abs() < 1e-6, "{}", sim.last_v[0]);
+    sim.run_until(Mode::Hold, 1000);
 }
 
 #[test]

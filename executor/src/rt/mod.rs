@@ -58,8 +58,11 @@ impl fmt::Display for Denied {
 #[must_use]
 pub fn become_real_time(priority: u8, cpu: Option<usize>) -> (bool, Denied) {
     let mut denied = Denied::default();
-    let lock = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
-    denied.note("locking memory", mlockall(lock).map_err(io::Error::from));
+    // First everything that is there, code included, is brought in and locked; what is mapped
+    // later is locked as it is touched, as filling a whole segment at once would take long.
+    let later = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
+    let lock = mlockall(MlockAllFlags::CURRENT).and_then(|()| mlockall(later));
+    denied.note("locking memory", lock.map_err(io::Error::from));
     if let Some(cpu) = cpu {
         let mut set = CpuSet::new();
         set.set(cpu);
