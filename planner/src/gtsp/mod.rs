@@ -33,6 +33,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod tour;
+pub mod tsplib;
 
 pub use exact::solve as solve_exact;
 pub use instance::{Block, CostFn, Costs, Ends, Instance, InstanceError, Jump, OnDemand, Weight};

@@ -96,13 +96,13 @@ pub enum SolveError {
 }
 
 /// Takes the progress; `Break` ends the search.
-pub type Observer = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + Send;
+pub type Observer<'a> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + Send + 'a;
 
 /// Watches and stops a search from outside.
 #[derive(Default)]
 pub struct Control<'a> {
     /// Called with every improvement; `Break` ends the search.
-    pub progress: Option<&'a mut Observer>,
+    pub progress: Option<&'a mut Observer<'a>>,
     /// Set it from any thread: the search ends within milliseconds, the best tour is returned.
     pub cancel: Option<&'a AtomicBool>,
 }
