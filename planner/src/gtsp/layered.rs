@@ -1,6 +1,6 @@
 //! Best node choice for a fixed order of clusters: shortest paths through layers.
 
-use super::local::Order;
+use super::order::Order;
 use super::table::Table;
 
 /// Scratch space for the layered shortest path.
@@ -39,7 +39,7 @@ impl Layers {
         last: usize,
         changed: &mut Vec<u32>,
     ) -> i64 {
-        let before = tour.stretch_cost(table, first - 1, last + 1);
+        let before = tour.stretch_cost(first - 1, last + 1);
         let (a, i) = tour.at(first - 1);
         let (z, k) = tour.at(last + 1);
         self.labels.clear();
@@ -69,6 +69,9 @@ impl Layers {
                 let at = self.starts[p - 1 - first];
                 node = lowest(&self.labels[at..at + column.len()], column).1;
             }
+        }
+        for p in first - 1..=last {
+            tour.refresh(table, p);
         }
         tour.cost += delta;
         delta
@@ -116,7 +119,7 @@ impl Layers {
             for p in 0..m {
                 tour.chosen[tour.order[p] as usize] = self.choice[p];
             }
-            tour.cost = best;
+            tour.refresh_all(table);
         }
     }
 

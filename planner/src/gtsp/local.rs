@@ -1,82 +1,15 @@
 //! The tour under search and its local search: 2-opt, relocation of short stretches and exchange
 //! of neighbouring stretches, each with the nodes at the new joints chosen anew.
 
-use super::layered::{Layers, lowest};
+use super::joint::{Joint, between};
+use super::layered::Layers;
+use super::order::Order;
 use super::table::Table;
 
 /// Longest stretch that is relocated as a whole.
 const LONGEST_RELOCATED: usize = 3;
 /// Positions on either side of a changed joint whose nodes are chosen anew together.
 const WINDOW: usize = 4;
-
-/// Order of the clusters with the root first, chosen nodes, and the cost in the table's units.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct Order {
-    pub(super) order: Vec<u32>,
-    pub(super) position: Vec<u32>,
-    pub(super) chosen: Vec<u32>,
-    pub(super) cost: i64,
-}
-
-impl Order {
-    pub(super) fn new(table: &Table, order: Vec<u32>, chosen: Vec<u32>) -> Self {
-        let mut position = vec![0; order.len()];
-        for (p, &c) in order.iter().enumerate() {
-            position[c as usize] = p as u32;
-        }
-        let mut tour = Self { order, position, chosen, cost: 0 };
-        tour.cost = tour.recomputed(table);
-        tour
-    }
-
-    pub(super) fn recomputed(&self, table: &Table) -> i64 {
-        self.stretch_cost(table, 0, self.order.len())
-    }
-
-    /// Takes another tour's place without allocating.
-    pub(super) fn copy_from(&mut self, other: &Self) {
-        self.order.copy_from_slice(&other.order);
-        self.position.copy_from_slice(&other.position);
-        self.chosen.copy_from_slice(&other.chosen);
-        self.cost = other.cost;
-    }
-
-    /// Cluster and node at a position; m is the root again.
-    #[inline]
-    pub(super) fn at(&self, p: usize) -> (u32, u32) {
-        let c = self.order[if p >= self.order.len() { p - self.order.len() } else { p }];
-        (c, self.chosen[c as usize])
-    }
-
-    /// Sum of the arcs from position `from` to position `to`.
-    pub(super) fn stretch_cost(&self, table: &Table, from: usize, to: usize) -> i64 {
-        let (mut a, mut i) = self.at(from);
-        let mut sum = 0;
-        for p in from + 1..=to {
-            let (b, j) = self.at(p);
-            sum += i64::from(table.d(a, i, b, j));
-            (a, i) = (b, j);
-        }
-        sum
-    }
-
-    pub(super) fn reverse(&mut self, first: usize, last: usize) {
-        self.order[first..=last].reverse();
-        self.renumber(first, last);
-    }
-
-    /// Exchanges the stretches `first..middle` and `middle..=last`.
-    pub(super) fn exchange(&mut self, first: usize, middle: usize, last: usize) {
-        self.order[first..=last].rotate_left(middle - first);
-        self.renumber(first, last);
-    }
-
-    fn renumber(&mut self, first: usize, last: usize) {
-        for p in first..=last {
-            self.position[self.order[p] as usize] = p as u32;
-        }
-    }
-}
 
 /// The best move found for a cluster.
 #[derive(Clone, Copy)]
@@ -183,11 +116,13 @@ impl LocalSearch {
             return false;
         }
         let mut best = (0_i64, None);
+        relocations(table, tour, c, &mut best);
         if table.reversible {
             reversals(table, tour, c, &mut best);
+        } else {
+            // Not where reversals do as well: this move alone would undo every kick.
+            exchanges(table, tour, c, &mut best);
         }
-        relocations(table, tour, c, &mut best);
-        exchanges(table, tour, c, &mut best);
         let (gain, Some(found)) = best else { return false };
         debug_assert!(gain < 0);
         self.apply(table, tour, found);
@@ -196,7 +131,7 @@ impl LocalSearch {
         true
     }
 
-    fn apply(&mut self, _table: &Table, tour: &mut Order, found: Move) {
+    fn apply(&mut self, table: &Table, tour: &mut Order, found: Move) {
         let m = tour.order.len();
         match found {
             Move::Reverse { first, last, nodes } => {
@@ -205,6 +140,9 @@ impl LocalSearch {
                     let c = tour.at(p).0;
                     tour.chosen[c as usize] = node;
                     self.push_position(tour, p);
+                }
+                for p in [first + m - 2, first - 1, first, last - 1, last, last + 1] {
+                    tour.refresh(table, p);
                 }
             }
             Move::Relocate { first, last, to, turned, left, ends } => {
@@ -225,11 +163,17 @@ impl LocalSearch {
                 tour.chosen[tour.order[start] as usize] = ends[0];
                 tour.chosen[tour.order[start + length - 1] as usize] = ends[1];
                 for p in start - 1..=start + length {
-                    self.push_position(tour, p % m);
+                    self.push_position(tour, p);
+                }
+                for p in start - 1..start + length {
+                    tour.refresh(table, p);
                 }
                 for c in [before, after] {
                     self.push(c);
                     self.touched.push(c);
+                    let p = tour.position[c as usize] as usize;
+                    tour.refresh(table, p + m - 1);
+                    tour.refresh(table, p);
                 }
             }
             Move::Exchange { first, middle, last } => {
@@ -238,58 +182,34 @@ impl LocalSearch {
                 for p in [first - 1, first, joint - 1, joint, last, last + 1] {
                     self.push_position(tour, p);
                 }
+                for p in [first - 1, joint - 1, last] {
+                    tour.refresh(table, p);
+                }
             }
         }
     }
 }
 
-/// Cheapest p → a → b → q over the nodes of a and b, with those nodes.
-#[inline]
-fn joint(table: &Table, p: (u32, u32), a: u32, b: u32, q: (u32, u32)) -> (i64, u32, u32) {
-    let (add_in, into) = table.row(p.0, p.1, a);
-    let (add, block) = table.block(a, b);
-    let (add_out, out) = table.column(b, q.0, q.1);
-    let mut best = (i32::MAX, 0, 0);
-    for (i, (d, row)) in into.iter().zip(block.chunks_exact(out.len())).enumerate() {
-        let (value, j) = lowest(row, out);
-        if d + value < best.0 {
-            best = (d + value, i as u32, j);
-        }
-    }
-    (i64::from(best.0) + i64::from(add_in) + i64::from(add) + i64::from(add_out), best.1, best.2)
-}
-
-/// Cheapest p → a → q over the nodes of a.
-#[inline]
-fn between(table: &Table, p: (u32, u32), a: u32, q: (u32, u32)) -> (i64, u32) {
-    let (add_in, into) = table.row(p.0, p.1, a);
-    let (add_out, out) = table.column(a, q.0, q.1);
-    let (value, node) = lowest(into, out);
-    (i64::from(value) + i64::from(add_in) + i64::from(add_out), node)
-}
-
-fn arc(table: &Table, tour: &Order, p: usize, q: usize) -> i64 {
-    let ((a, i), (b, j)) = (tour.at(p), tour.at(q));
-    i64::from(table.d(a, i, b, j))
-}
-
 fn reversals(table: &Table, tour: &Order, c: u32, best: &mut (i64, Option<Move>)) {
     let m = tour.order.len();
     let p = tour.position[c as usize] as usize;
-    let behind = arc(table, tour, (p + m - 1) % m, p);
-    let ahead = arc(table, tour, p, p + 1);
-    let slack = behind.max(ahead);
+    let behind = (p + m - 1) % m;
+    // The removed arc, and what the cluster's other arc could gain by another node.
+    let ahead_limit = tour.arc(p) + tour.loose(behind);
+    let behind_limit = tour.arc(behind) + tour.loose(p);
     for (n, low) in table.near_out(c) {
-        if i64::from(low) >= behind + ahead {
+        let low = i64::from(low);
+        if low >= ahead_limit.max(behind_limit) {
             break;
         }
         let q = tour.position[n as usize] as usize;
-        if i64::from(low) < ahead + slack {
+        if low < ahead_limit {
             try_reversal(table, tour, p.min(q), p.max(q), best);
         }
-        // New arc between the two clusters, both entered where they were left.
-        let (x, y) = ((p + m - 1) % m, (q + m - 1) % m);
-        try_reversal(table, tour, x.min(y), x.max(y), best);
+        if low < behind_limit {
+            let q = (q + m - 1) % m;
+            try_reversal(table, tour, behind.min(q), behind.max(q), best);
+        }
     }
 }
 
@@ -300,21 +220,27 @@ fn try_reversal(table: &Table, tour: &Order, i: usize, j: usize, best: &mut (i64
         return;
     }
     let before = (i + m - 1) % m;
-    let old = arc(table, tour, before, i)
-        + arc(table, tour, i, i + 1)
-        + arc(table, tour, i + 1, i + 2)
-        + arc(table, tour, j - 1, j)
-        + arc(table, tour, j, j + 1)
-        + arc(table, tour, j + 1, j + 2);
-    let (first, a, b) = joint(table, tour.at(before), tour.at(i).0, tour.at(j).0, tour.at(j - 1));
-    if first - old >= best.0 {
+    let (a, b) = (tour.order[i], tour.order[i + 1]);
+    let (c, d) = (tour.order[j], tour.at(j + 1).0);
+    let removed = tour.arc(i) + tour.arc(j);
+    let loose = tour.loose(before) + tour.loose(i + 1) + tour.loose(j - 1) + tour.loose(j + 1);
+    if i64::from(table.low(a, c)) + i64::from(table.low(b, d)) - removed - loose >= best.0 {
         return;
     }
-    let (second, x, y) =
-        joint(table, tour.at(i + 2), tour.at(i + 1).0, tour.at(j + 1).0, tour.at(j + 2));
-    let delta = first + second - old;
-    if delta < best.0 {
-        *best = (delta, Some(Move::Reverse { first: i + 1, last: j, nodes: [a, b, x, y] }));
+    let old = removed + tour.arc(before) + tour.arc(i + 1) + tour.arc(j - 1) + tour.arc(j + 1);
+    let first = Joint::new(table, tour.at(before), tour.at(i).0, tour.at(j).0, tour.at(j - 1));
+    if first.bound - old >= best.0 {
+        return;
+    }
+    let second =
+        Joint::new(table, tour.at(i + 2), tour.at(i + 1).0, tour.at(j + 1).0, tour.at(j + 2));
+    let limit = best.0 + old;
+    let one = first.value(limit - second.bound);
+    let two = second.value(limit - one);
+    if one + two < limit {
+        let ([a, b], [x, y]) = (first.nodes(one), second.nodes(two));
+        *best =
+            (one + two - old, Some(Move::Reverse { first: i + 1, last: j, nodes: [a, b, x, y] }));
     }
 }
 
@@ -347,41 +273,57 @@ fn relocate_stretch(
 ) {
     let m = tour.order.len();
     let (before, after) = (tour.at(first - 1), tour.at(last + 1));
-    let removed = arc(table, tour, first - 1, first) + arc(table, tour, last, last + 1);
+    let removed = tour.arc(first - 1) + tour.arc(last);
     let plain = i64::from(table.d(before.0, before.1, after.0, after.1));
     let outer = (first + m - 2) % m;
-    let old_left = arc(table, tour, outer, first - 1) + arc(table, tour, last + 1, last + 2);
-    let (chosen, left_a, left_b) =
-        joint(table, tour.at(outer), before.0, after.0, tour.at(last + 2));
-    let chosen = chosen - old_left;
+    let old_left = tour.arc(outer) + tour.arc(last + 1);
+    let around = tour.loose(outer) + tour.loose(last + 1);
+    let most = removed + around - i64::from(table.low(before.0, after.0));
+    let nearest = table.near_in(c).chain(table.near_out(c)).map(|(_, low)| low).min();
+    if nearest.is_none_or(|low| i64::from(low) >= most) {
+        return;
+    }
+    let closing = Joint::new(table, tour.at(outer), before.0, after.0, tour.at(last + 2));
+    let value = closing.value(plain + old_left);
+    let chosen = value - old_left;
     let saving = removed - chosen.min(plain);
-    let inner = tour.stretch_cost(table, first, last);
+    let inner = tour.stretch_cost(first, last);
     let inner_turned = if table.reversible { inner } else { turned_cost(table, tour, first, last) };
+    // Turning a stretch may cost anything where costs are not symmetric.
+    let inner_loose = match last - first {
+        0 => 0,
+        1 if table.reversible => tour.loose(first),
+        2 if table.reversible => tour.loose(first) + tour.loose(first + 1),
+        _ => i64::from(i32::MAX),
+    };
     let mut attempt = |to: usize, turned: bool| {
         if to + 1 >= first && to <= last {
             return;
         }
         let (x, y) = (tour.at(to), tour.at(to + 1));
         let untouched = [x.0, y.0].iter().all(|k| *k != before.0 && *k != after.0);
-        let (left, left_nodes) = if untouched && chosen < plain {
-            (chosen, [left_a, left_b])
-        } else {
-            (plain, [before.1, after.1])
-        };
-        let gap = i64::from(table.d(x.0, x.1, y.0, y.1));
-        let rest = left - removed - gap;
-        if rest >= best.0 {
+        let anew = untouched && chosen < plain;
+        let gap = tour.arc(to);
+        let rest = if anew { chosen } else { plain } - removed - gap;
+        let (head, tail) = if turned { (last, first) } else { (first, last) };
+        let (enter, leave) = (table.low(x.0, tour.order[head]), table.low(tour.order[tail], y.0));
+        let ways = i64::from(enter) + i64::from(leave);
+        if rest + ways - inner_loose >= best.0 {
             return;
         }
-        let (head, tail) = if turned { (last, first) } else { (first, last) };
         let (new, ends) = match last - first {
             0 => {
                 let (cost, node) = between(table, x, tour.at(first).0, y);
                 (cost, [node, node])
             }
             1 => {
-                let (cost, a, b) = joint(table, x, tour.at(head).0, tour.at(tail).0, y);
-                (cost - inner, [a, b])
+                let joint = Joint::new(table, x, tour.at(head).0, tour.at(tail).0, y);
+                let limit = best.0 - rest + inner;
+                let cost = joint.value(limit);
+                if cost >= limit {
+                    return;
+                }
+                (cost - inner, joint.nodes(cost))
             }
             _ => {
                 let (next, last_but_one) =
@@ -392,7 +334,7 @@ fn relocate_stretch(
                     pair(table, tour.at(head), tour.at(next))
                         + pair(table, tour.at(last_but_one), tour.at(tail))
                 } else {
-                    arc(table, tour, first, next) + arc(table, tour, last_but_one, last)
+                    tour.arc(first) + tour.arc(last_but_one)
                 };
                 let turning = if turned { inner_turned - inner } else { 0 };
                 (cost_in + cost_out - ends + turning, [a, b])
@@ -400,8 +342,8 @@ fn relocate_stretch(
         };
         let delta = rest + new;
         if delta < best.0 {
-            *best =
-                (delta, Some(Move::Relocate { first, last, to, turned, left: left_nodes, ends }));
+            let left = if anew { closing.nodes(value) } else { [before.1, after.1] };
+            *best = (delta, Some(Move::Relocate { first, last, to, turned, left, ends }));
         }
     };
     let leads = tour.at(first).0 == c;
@@ -444,7 +386,7 @@ fn exchanges(table: &Table, tour: &Order, c: u32, best: &mut (i64, Option<Move>)
     let p = tour.position[c as usize] as usize;
     let next = tour.at(p + 1);
     let here = tour.at(p);
-    let ahead = pair(table, here, next);
+    let ahead = tour.arc(p);
     for (n, low) in table.near_out(c) {
         if i64::from(low) >= ahead {
             break;
@@ -453,7 +395,7 @@ fn exchanges(table: &Table, tour: &Order, c: u32, best: &mut (i64, Option<Move>)
         if q == 0 {
             continue;
         }
-        let first_gain = ahead - pair(table, here, tour.at(q)) + arc(table, tour, q - 1, q);
+        let first_gain = ahead - pair(table, here, tour.at(q)) + tour.arc(q - 1);
         if first_gain <= 0 {
             continue;
         }
@@ -472,7 +414,7 @@ fn exchanges(table: &Table, tour: &Order, c: u32, best: &mut (i64, Option<Move>)
             let new = pair(table, here, tour.at(q))
                 + pair(table, tour.at(r), next)
                 + pair(table, tour.at(q - 1), tour.at(r + 1));
-            let old = ahead + arc(table, tour, q - 1, q) + arc(table, tour, r, r + 1);
+            let old = ahead + tour.arc(q - 1) + tour.arc(r);
             if new - old < best.0 {
                 *best = (new - old, Some(Move::Exchange { first, middle, last }));
             }

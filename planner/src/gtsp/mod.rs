@@ -23,10 +23,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod eax;
 mod exact;
 mod instance;
+mod joint;
 mod layered;
 mod local;
+mod order;
+mod pool;
 mod search;
 mod solve;
 mod table;

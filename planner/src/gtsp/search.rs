@@ -3,7 +3,8 @@
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::local::{LocalSearch, Order};
+use super::local::LocalSearch;
+use super::order::Order;
 use super::table::Table;
 
 /// Longest of the two stretches that a kick exchanges.
@@ -151,13 +152,14 @@ fn kick(table: &Table, local: &mut LocalSearch, tour: &mut Order, rng: &mut ChaC
     let two = rng.random_range(1..=longest.min(m - 1 - one));
     let first = rng.random_range(1..=m - one - two);
     let (middle, last) = (first + one, first + one + two - 1);
-    let joints = [(first - 1, first), (middle - 1, middle), (last, last + 1)];
-    let before: i64 = joints.iter().map(|&(p, q)| tour.stretch_cost(table, p, q)).sum();
+    let before = tour.stretch_cost(first - 1, last + 1);
     tour.exchange(first, middle, last);
     let middle = first + two;
     let joints = [(first - 1, first), (middle - 1, middle), (last, last + 1)];
-    let after: i64 = joints.iter().map(|&(p, q)| tour.stretch_cost(table, p, q)).sum();
-    tour.cost += after - before;
+    for (p, _) in joints {
+        tour.refresh(table, p);
+    }
+    tour.cost += tour.stretch_cost(first - 1, last + 1) - before;
     for (p, q) in joints {
         local.push(tour.at(p).0);
         local.push(tour.at(q).0);

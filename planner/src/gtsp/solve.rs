@@ -6,12 +6,11 @@ use std::time::{Duration, Instant};
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::exact;
 use super::instance::Instance;
-use super::local::LocalSearch;
-use super::search::{Cooling, construct, iterate, settle};
+use super::order::Order;
+use super::pool::evolve;
 use super::table::Table;
 use super::tour::{Tour, TourCost};
 
@@ -43,7 +42,7 @@ impl Budget {
     }
 }
 
-/// State of the search, told whenever the best tour has improved and after every round.
+/// State of the search, told whenever the best tour has improved.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
     /// Best tour so far.
@@ -151,17 +150,12 @@ pub fn solve_with(
     Ok(pool.install(|| rounds(instance, budget, seed, control, started)))
 }
 
-/// Runs side by side in a round.
-const RUNS: u64 = 8;
-/// Trials of the first round's runs; later rounds double them.
-const FIRST_TRIALS: u64 = 4000;
-
-/// The search without the exact method; at least one run is always made.
+/// The search without the exact method; at least one tour is always made.
 pub(super) fn rounds(
     instance: &Instance,
     budget: &Budget,
     seed: u64,
-    mut control: Control<'_>,
+    control: Control<'_>,
     started: Instant,
 ) -> Solution {
     let table = Table::new(instance);
@@ -172,59 +166,76 @@ pub(super) fn rounds(
             || cancel.is_some_and(|c| c.load(Ordering::Relaxed))
             || budget.time.is_some_and(|t| started.elapsed() >= t)
     };
+    let mut record = Record {
+        instance,
+        table: &table,
+        best: None,
+        made: 0,
+        target: budget.target,
+        progress: control.progress,
+        started,
+        stopped: &stopped,
+    };
+    let mut streams = Streams { seed, next: 0 };
     let limit = budget.trials.unwrap_or(u64::MAX);
-    let mut best: Option<(Tour, TourCost)> = None;
-    let mut made = 0;
-    let mut round = 0;
-    loop {
-        let runs: Vec<_> = (0..RUNS)
-            .into_par_iter()
-            .filter_map(|run| {
-                if run > 0 && stop() {
-                    return None;
-                }
-                let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                rng.set_stream(round * RUNS + run);
-                let mut local = LocalSearch::new(table.m);
-                let mut tour = construct(&table, &mut rng);
-                settle(&table, &mut local, &mut tour);
-                let left = limit.saturating_sub(made).div_ceil(RUNS);
-                let trials = (FIRST_TRIALS << round.min(8)).min(left);
-                let cooling = Cooling { trials, from: 0.5, to: 0.03 };
-                let made = iterate(&table, &mut local, &mut tour, cooling, &mut rng, &stop);
-                Some((tour, made))
-            })
-            .collect();
-        for (tour, trials) in runs {
-            made += trials.max(1);
-            let tour = table.tour(&tour.order, &tour.chosen);
-            let cost = tour.cost(instance);
-            if best.as_ref().is_none_or(|(_, b)| cost.better_than(b)) {
-                best = Some((tour, cost));
-                report(&best, &mut control, started, made, &stopped);
-            }
-        }
-        round += 1;
-        let reached = best.as_ref().zip(budget.target).is_some_and(|((_, c), t)| c.total() <= t);
-        if made >= limit || stop() || reached {
+    let mut elite = Vec::new();
+    for epoch in 0.. {
+        let left = limit.saturating_sub(record.made);
+        evolve(&table, epoch, left, &mut elite, &mut streams, &stop, &mut record);
+        if record.made >= limit || stop() {
             break;
         }
     }
-    let (tour, cost) = best.expect("the first run of a round is never skipped");
+    let made = record.made;
+    let (tour, cost) = record.best.expect("every epoch records a tour");
     Solution { tour, cost, trials: made, elapsed: started.elapsed(), lower_bound: None }
 }
 
-fn report(
-    best: &Option<(Tour, TourCost)>,
-    control: &mut Control<'_>,
+/// Random streams of one seed, handed out in a fixed order before the threads start.
+pub(super) struct Streams {
+    pub(super) seed: u64,
+    pub(super) next: u64,
+}
+
+impl Streams {
+    /// A generator that no other task shares.
+    pub(super) fn next(&mut self) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(self.next);
+        self.next += 1;
+        rng
+    }
+}
+
+/// Keeps the best tour by its true cost and tells the observer.
+pub(super) struct Record<'a, 'b> {
+    instance: &'a Instance,
+    table: &'a Table,
+    best: Option<(Tour, TourCost)>,
+    /// Trials made so far.
+    pub(super) made: u64,
+    target: Option<f64>,
+    progress: Option<&'b mut Observer<'b>>,
     started: Instant,
-    trials: u64,
-    stopped: &AtomicBool,
-) {
-    if let (Some((tour, cost)), Some(progress)) = (best, control.progress.as_mut()) {
-        let told = Progress { tour, cost: *cost, elapsed: started.elapsed(), trials };
-        if progress(&told).is_break() {
-            stopped.store(true, Ordering::Relaxed);
+    stopped: &'a AtomicBool,
+}
+
+impl Record<'_, '_> {
+    /// Considers a tour of the search.
+    pub(super) fn offer(&mut self, order: &Order) {
+        let tour = self.table.tour(&order.order, &order.chosen);
+        let cost = tour.cost(self.instance);
+        if self.best.as_ref().is_some_and(|(_, best)| !cost.better_than(best)) {
+            return;
+        }
+        let mut end = self.target.is_some_and(|t| cost.total() <= t);
+        if let Some(progress) = &mut self.progress {
+            let elapsed = self.started.elapsed();
+            end |= progress(&Progress { tour: &tour, cost, elapsed, trials: self.made }).is_break();
+        }
+        self.best = Some((tour, cost));
+        if end {
+            self.stopped.store(true, Ordering::Relaxed);
         }
     }
 }

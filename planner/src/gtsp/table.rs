@@ -13,7 +13,9 @@ const JUMP_FACTOR: f64 = 4.0;
 /// An entry that is the largest of all and at least this common is "no arc" in disguise.
 const DISGUISED_JUMPS: f64 = 0.3;
 /// Length of a candidate list.
-pub(super) const NEAR: usize = 10;
+const NEAR: usize = 10;
+/// Costs that are handled side by side; blocks may be read this far past their end.
+pub(super) const LANES: usize = 8;
 
 /// Costs for the search over `m` clusters, one of which, the root, always stands at position 0.
 pub(super) struct Table {
@@ -27,6 +29,7 @@ pub(super) struct Table {
     pairs: Vec<Pair>,
     transposed: Vec<u32>,
     data: Vec<i32>,
+    lowest: Vec<i32>,
     near_out: Vec<u32>,
     near_in: Vec<u32>,
     near_cost: Vec<i32>,
@@ -162,6 +165,7 @@ impl Table {
                 data.extend_from_slice(&row);
             } else {
                 pairs[a * m + b] = Pair { at: 0, add: search_price };
+                lowest[a * m + b] = search_price;
             }
         }
         let reversible = raw.pairs().all(|(a, b)| {
@@ -197,6 +201,7 @@ impl Table {
                 start as u32
             };
         }
+        data.extend_from_slice(&[0; LANES]);
         let mut table = Self {
             m,
             root,
@@ -206,6 +211,7 @@ impl Table {
             pairs,
             transposed,
             data,
+            lowest,
             near_out: Vec::new(),
             near_in: Vec::new(),
             near_cost: Vec::new(),
@@ -213,27 +219,28 @@ impl Table {
             near_start: Vec::new(),
             outer_root: root >= clusters,
         };
-        table.find_candidates(&lowest, *instance.ends() != Ends::Closed);
+        table.find_candidates(*instance.ends() != Ends::Closed);
         table
     }
 
-    fn find_candidates(&mut self, lowest: &[i32], open: bool) {
+    fn find_candidates(&mut self, open: bool) {
         let m = self.m;
         let mut typical = 0.0;
         let mut counted = 0;
         for a in 0..m {
-            let list = |cost: &dyn Fn(usize) -> i32, skip_root: bool| {
-                let mut list: Vec<(i32, usize)> = (0..m)
-                    .filter(|&b| b != a && !(skip_root && b == self.root))
-                    .map(|b| (cost(b), b))
-                    .filter(|(c, _)| *c != i32::MAX)
-                    .collect();
-                list.sort_unstable();
-                list.truncate(NEAR);
-                list
-            };
-            let out = list(&|b| lowest[a * m + b], open);
-            let into = list(&|b| lowest[b * m + a], false);
+            let list =
+                |cost: &dyn Fn(usize) -> i32, present: &dyn Fn(usize) -> bool, skip_root: bool| {
+                    let mut list: Vec<(i32, usize)> = (0..m)
+                        .filter(|&b| b != a && !(skip_root && b == self.root))
+                        .filter(|&b| present(b))
+                        .map(|b| (cost(b), b))
+                        .collect();
+                    list.sort_unstable();
+                    list.truncate(NEAR);
+                    list
+                };
+            let out = list(&|b| self.lowest[a * m + b], &|b| self.pairs[a * m + b].at != 0, open);
+            let into = list(&|b| self.lowest[b * m + a], &|b| self.pairs[b * m + a].at != 0, false);
             if let Some(&(c, _)) = out.first() {
                 typical += f64::from(c);
                 counted += 1;
@@ -283,6 +290,19 @@ impl Table {
         let pair = self.pairs[a as usize * self.m + b as usize];
         let count = (self.sizes[a as usize] * self.sizes[b as usize]) as usize;
         (pair.add, &self.data[pair.at as usize..pair.at as usize + count])
+    }
+
+    /// Cheapest arc from `a` to `b`.
+    #[inline]
+    pub(super) fn low(&self, a: u32, b: u32) -> i32 {
+        self.lowest[a as usize * self.m + b as usize]
+    }
+
+    /// The block from `a` to `b` with the data that follow it, at least `LANES` entries.
+    #[inline]
+    pub(super) fn open_block(&self, a: u32, b: u32) -> (i32, &[i32]) {
+        let pair = self.pairs[a as usize * self.m + b as usize];
+        (pair.add, &self.data[pair.at as usize..])
     }
 
     /// Clusters that are cheap to reach from `a`, nearest first, with the cheapest arc.

@@ -153,7 +153,9 @@ impl<'a> Parser<'a> {
             match key.as_str() {
                 "NAME" => value.clone_into(&mut self.header.name),
                 "TYPE" => self.kind(value, line)?,
-                "DIMENSION" => self.header.nodes = Some(count(value.as_bytes(), line, "DIMENSION")?),
+                "DIMENSION" => {
+                    self.header.nodes = Some(count(value.as_bytes(), line, "DIMENSION")?)
+                }
                 "GTSP_SETS" => self.header.sets = Some(count(value.as_bytes(), line, "GTSP_SETS")?),
                 "EDGE_WEIGHT_TYPE" => {
                     let known = WeightType::from_name(value);
@@ -190,7 +192,10 @@ impl<'a> Parser<'a> {
     fn nodes(&self) -> Result<usize, TsplibError> {
         match self.header.nodes {
             Some(n) if n > 0 => Ok(n),
-            _ => Err(TsplibError::Missing { line: self.words.line, what: "DIMENSION before the data" }),
+            _ => Err(TsplibError::Missing {
+                line: self.words.line,
+                what: "DIMENSION before the data",
+            }),
         }
     }
 
@@ -226,7 +231,11 @@ impl<'a> Parser<'a> {
     fn matrix(&mut self) -> Result<(), TsplibError> {
         let n = self.nodes()?;
         if n > MOST_NODES {
-            return Err(TsplibError::TooLarge { line: self.words.line, nodes: n, most: MOST_NODES });
+            return Err(TsplibError::TooLarge {
+                line: self.words.line,
+                nodes: n,
+                most: MOST_NODES,
+            });
         }
         let format = self.header.format.ok_or(TsplibError::Missing {
             line: self.words.line,
@@ -336,7 +345,9 @@ impl Header {
         let of = Arc::clone(&numbers);
         let cost: super::super::instance::CostFn = if weight == WeightType::Explicit {
             match self.matrix.ok_or(missing("EDGE_WEIGHT_SECTION"))? {
-                Matrix::Whole(w) => Arc::new(move |a, i, b, j| f64::from(w[of[a][i] * n + of[b][j]])),
+                Matrix::Whole(w) => {
+                    Arc::new(move |a, i, b, j| f64::from(w[of[a][i] * n + of[b][j]]))
+                }
                 Matrix::Real(w) => Arc::new(move |a, i, b, j| w[of[a][i] * n + of[b][j]]),
             }
         } else {
@@ -347,8 +358,7 @@ impl Header {
         let costs = Costs::OnDemand(OnDemand { neighbours: None, cost });
         let instance = Instance::new(&sizes, costs, Jump::Forbidden, Ends::Closed)
             .map_err(TsplibError::Instance)?;
-        let node_numbers =
-            numbers.iter().map(|set| set.iter().map(|v| v + 1).collect()).collect();
+        let node_numbers = numbers.iter().map(|set| set.iter().map(|v| v + 1).collect()).collect();
         Ok(GtspFile { name: self.name, instance, node_numbers })
     }
 }

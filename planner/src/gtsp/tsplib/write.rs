@@ -38,7 +38,11 @@ pub fn export(instance: &Instance, name: &str, out: &mut dyn Write) -> io::Resul
         match instance.ends() {
             Ends::OpenFromCosts(_) if b == usize::MAX => Some(0.0),
             Ends::OpenFromCosts(start) if a == usize::MAX => {
-                if start[v].is_finite() { Some(start[v]) } else { price(instance.start_jump_price()) }
+                if start[v].is_finite() {
+                    Some(start[v])
+                } else {
+                    price(instance.start_jump_price())
+                }
             }
             &Ends::OpenFromCluster(first) if b == first => Some(0.0),
             _ => instance.arc(a, i, b, j).or_else(|| price(instance.jump_price(a, b))),
@@ -119,7 +123,12 @@ impl Exported {
 }
 
 /// Writes node numbers as a TSPLIB tour.
-pub fn write_tour(name: &str, numbers: &[usize], value: f64, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_tour(
+    name: &str,
+    numbers: &[usize],
+    value: f64,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     writeln!(out, "NAME : {name}\nCOMMENT : Length = {value}\nTYPE : TOUR")?;
     writeln!(out, "DIMENSION : {}\nTOUR_SECTION", numbers.len())?;
     for number in numbers {
