@@ -132,7 +132,7 @@ impl Crossover {
         loop {
             let steps = self.path.len() - 1;
             let here = self.path[steps];
-            let rest = if steps % 2 == 0 { &mut self.rest_a } else { &mut self.rest_b };
+            let rest = if steps.is_multiple_of(2) { &mut self.rest_a } else { &mut self.rest_b };
             let slots = rest[here as usize];
             if slots[0] == NONE {
                 debug_assert_eq!(steps, 0);
