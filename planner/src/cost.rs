@@ -100,7 +100,5 @@ pub fn displacement(continuous: &[bool; MAX_DOF], a: &JointVector, b: &JointVect
 /// The cost of a polyline of joint vectors.
 #[must_use]
 pub fn of_path<C: Cost>(cost: &C, path: &[JointVector]) -> f64 {
-    path.windows(2)
-        .map(|w| cost.of(&std::array::from_fn(|j| (w[1][j] - w[0][j]).abs())))
-        .sum()
+    path.windows(2).map(|w| cost.of(&std::array::from_fn(|j| (w[1][j] - w[0][j]).abs()))).sum()
 }

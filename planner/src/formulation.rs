@@ -115,8 +115,7 @@ pub fn curvature(a: &Isometry3<f64>, b: &Isometry3<f64>, beta: f64, symmetric: b
     let between = a.inv_mul(b);
     let mut angle = between.rotation.angle();
     if symmetric {
-        let half_turn =
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
         angle = angle.min((between.rotation * half_turn).angle());
     }
     (1.0 - beta) * between.translation.vector.norm() + beta * angle
@@ -136,8 +135,11 @@ impl Problem<'_> {
     fn solve(&self, method: Method, seed: u64) -> Result<Vec<Stop>, FormulationError> {
         match method {
             Method::Tsp => {
-                let nodes: Vec<Vec<Stop>> =
-                    self.component.iter().map(|&patch| vec![Stop { patch, heading: 0.0 }]).collect();
+                let nodes: Vec<Vec<Stop>> = self
+                    .component
+                    .iter()
+                    .map(|&patch| vec![Stop { patch, heading: 0.0 }])
+                    .collect();
                 let order = self.search(&nodes, seed, |a, b| {
                     (a.translation.vector - b.translation.vector).norm()
                 })?;

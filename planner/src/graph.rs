@@ -4,7 +4,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::patches::Patch;
-use crate::reach::{Sample, Workcell, contact_pose, direction, heading_of, middle_out, redundancies};
+use crate::reach::{
+    Sample, Workcell, contact_pose, direction, heading_of, middle_out, redundancies,
+};
 use crate::surface::{Surface, SurfacePoint};
 use crate::track::ToolPath;
 
@@ -178,9 +180,8 @@ fn can_be_followed(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, values: &
             return false;
         }
         cell.samples(&end, edge.heading_b, &[value], &mut to);
-        from.iter().any(|f| {
-            to.iter().any(|t| t.branch == f.branch && cell.follow(&path, f, t).is_ok())
-        })
+        from.iter()
+            .any(|f| to.iter().any(|t| t.branch == f.branch && cell.follow(&path, f, t).is_ok()))
     })
 }
 

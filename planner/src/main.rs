@@ -1,2 +1,5 @@
-//! stub
-fn main() {}
+//! The `planner` binary: one call into the library.
+
+fn main() -> std::process::ExitCode {
+    nullsweep_planner::cli::main(std::env::args_os())
+}

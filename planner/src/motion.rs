@@ -6,7 +6,7 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use crate::cost::{self, Cost};
 use crate::graph::Graph;
-use crate::layered::{Motion, Moves};
+use crate::layered::{Link, Motion, Moves};
 use crate::reach::{Sample, Workcell};
 use crate::track::ToolPath;
 use crate::transfer;
@@ -32,6 +32,8 @@ impl Leg {
 pub struct Mover<'a, C> {
     cell: Workcell<'a>,
     graph: &'a Graph,
+    /// The patch of each stop of the tour.
+    stops: &'a [usize],
     cost: &'a C,
     source: JointVector,
     /// Added to every jump, so that the tool does not leave the surface for a trifle: the cost of
@@ -45,18 +47,19 @@ const LIFT_JOINTS: usize = 4;
 const LIFT_ANGLE: f64 = 0.8;
 
 impl<'a, C: Cost> Mover<'a, C> {
-    /// For an arm that stands at `source` before the first motion.
+    /// For a tour over the patches `stops` and an arm that stands at `source` before the first motion.
     #[must_use]
     pub fn new(
         cell: Workcell<'a>,
         graph: &'a Graph,
+        stops: &'a [usize],
         cost: &'a C,
         source: JointVector,
         seed: u64,
     ) -> Self {
         let mut lift = [0.0; nullsweep_robot::MAX_DOF];
         lift[..LIFT_JOINTS.min(cell.arm.dof())].fill(LIFT_ANGLE);
-        Self { cell, graph, cost, source, lift: cost.of(&lift), seed }
+        Self { cell, graph, stops, cost, source, lift: cost.of(&lift), seed }
     }
 
     /// A seed that depends on the two ends alone, not on when or on which thread it is asked for.
@@ -71,6 +74,14 @@ impl<'a, C: Cost> Mover<'a, C> {
 
 impl<C: Cost> Moves for Mover<'_, C> {
     type Path = Leg;
+
+    fn link(&self, from: usize, to: usize) -> Link {
+        let (a, b) = (self.stops[from], self.stops[to]);
+        match self.graph.between(a, b) {
+            Some(edge) => Link::Surface { edge, reversed: self.graph.edges[edge].a != a },
+            None => Link::Jump,
+        }
+    }
 
     fn track(&self, link: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<Leg>> {
         let (edge, reversed) = link;

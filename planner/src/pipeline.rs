@@ -13,7 +13,7 @@ use crate::cost::{self, Cost, CostKind, Effort, TaskTime};
 use crate::coverage;
 use crate::formulation::{self, FormulationConfig, FormulationError, Method, Stop};
 use crate::graph::{self, Graph, GraphConfig};
-use crate::layered::{self, Link};
+use crate::layered;
 use crate::motion::{Leg, Mover};
 use crate::patches::{self, Patch, PatchConfig};
 use crate::plan::{Continues, FORMAT, Held, Plan, PlanKnot, SurfaceSample};
@@ -160,13 +160,17 @@ pub enum PipelineError {
     #[error(transparent)]
     Collision(#[from] CollisionError),
     /// No patch was found.
-    #[error("no locally planar patch among {points} points: is the scale metres? try a larger patch (--patch-radius)")]
+    #[error(
+        "no locally planar patch among {points} points: is the scale metres? try a larger patch (--patch-radius)"
+    )]
     NoPatches {
         /// How many points.
         points: usize,
     },
     /// No stance reaches anything.
-    #[error("no stance of {tried} reaches any of the {patches} patches: is the object within the arm's height? try --torso or --base x,y,yaw")]
+    #[error(
+        "no stance of {tried} reaches any of the {patches} patches: is the object within the arm's height? try --torso or --base x,y,yaw"
+    )]
     NoStance {
         /// Stances tried with an exact look.
         tried: usize,
@@ -186,7 +190,9 @@ pub enum PipelineError {
         hit: String,
     },
     /// The start is outside the limits.
-    #[error("the start posture leaves the margined soft limits: {joint} at {value:.4}, limits {low:.4} … {high:.4}")]
+    #[error(
+        "the start posture leaves the margined soft limits: {joint} at {value:.4}, limits {low:.4} … {high:.4}"
+    )]
     StartLimit {
         /// Which joint.
         joint: String,
@@ -206,7 +212,9 @@ pub enum PipelineError {
         base: [f64; 3],
     },
     /// No motion to any patch was found.
-    #[error("no motion from the start posture to any of the {reachable} reachable patches was found; give another --start")]
+    #[error(
+        "no motion from the start posture to any of the {reachable} reachable patches was found; give another --start"
+    )]
     NoMotion {
         /// How many patches are reachable.
         reachable: usize,
@@ -250,9 +258,8 @@ pub fn run(
         |after| swept_before(after, &arm, &scan),
     )?;
     progress.stage("reach", Some(patches.len()));
-    let mut reached = clock.time("reach", || {
-        reach(cell, &patches, job.ik_samples, &|| progress.tick())
-    });
+    let mut reached =
+        clock.time("reach", || reach(cell, &patches, job.ik_samples, &|| progress.tick()));
     let reachable: Vec<bool> = reached.iter().map(Option::is_some).collect();
     if !reachable.contains(&true) {
         return Err(PipelineError::NothingReached { patches: patches.len(), base: stance.base });
@@ -291,13 +298,15 @@ pub fn run(
 
     progress.stage("layered graph and transfers", None);
     let velocity = cost::velocities(&arm, job.v_max);
-    let context = Context { cell, graph: &graph, patches: &patches, start, job, progress };
+    let context =
+        Context { cell, graph: &graph, patches: &patches, reached: &reached, start, job, progress };
     let sequence = clock.time("layered", || match job.cost {
         CostKind::Effort => context.sequence(&Effort, &tour),
         CostKind::Time => context.sequence(&TaskTime::new(&velocity), &tour),
     })?;
 
-    let plan = assemble(robot, &arm, job, &stance, &scan, &patches, &reachable, &sequence, &velocity);
+    let plan =
+        assemble(robot, &arm, job, &stance, &scan, &patches, &reachable, &sequence, &velocity);
     progress.stage("verify", Some(plan.knots.len().saturating_sub(1)));
     let verification = clock.time("verify", || {
         verify::verify(&plan, &arm, &world, &scan, &surface, &already, &|| progress.tick())
@@ -488,6 +497,7 @@ struct Context<'a> {
     cell: Workcell<'a>,
     graph: &'a Graph,
     patches: &'a [Patch],
+    reached: &'a [Option<Sample>],
     start: JointVector,
     job: &'a Job,
     progress: &'a dyn Progress,
@@ -504,7 +514,7 @@ struct Sequence {
 
 impl Context<'_> {
     /// The cheapest joint path through the tour's poses. A stop into which no motion is found is
-    /// left out, and the rest is searched again.
+    /// left out.
     fn sequence<C: Cost>(&self, cost: &C, tour: &[Stop]) -> Result<Sequence, PipelineError> {
         let arm = self.cell.arm;
         let mut continuous = [false; MAX_DOF];
@@ -512,46 +522,48 @@ impl Context<'_> {
             *c = limits.continuous;
         }
         let values = redundancies(arm.ik().redundancy_range(), self.job.ik_samples);
-        let mut stops = tour.to_vec();
-        let mut layers: Vec<Vec<Sample>> =
+        let layers: Vec<Vec<Sample>> =
             tour.par_iter().map(|stop| self.layer(stop, &values)).collect();
+        let stops: Vec<usize> = tour.iter().map(|stop| stop.patch).collect();
+        let mover = Mover::new(self.cell, self.graph, &stops, cost, self.start, self.job.seed);
         let mut dropped = Vec::new();
-        let mover = Mover::new(self.cell, self.graph, cost, self.start, self.job.seed);
-        while !stops.is_empty() {
-            let links: Vec<Link> =
-                stops.windows(2).map(|w| self.link(w[0].patch, w[1].patch)).collect();
-            let found =
-                layered::shortest(cost, &continuous, &self.start, &layers, &links, &mover);
-            match found {
-                Ok(path) => {
-                    let legs: Vec<(usize, Leg)> = stops
-                        .iter()
-                        .map(|s| s.patch)
-                        .zip(path.motions.into_iter().map(|m| m.path))
-                        .collect();
-                    return Ok(Sequence {
-                        jumps: legs.iter().filter(|(_, leg)| leg.is_jump()).count(),
-                        legs,
-                        samples: layers.iter().map(Vec::len).sum(),
-                        dropped,
-                    });
-                }
-                Err(layered::Unreachable { layer }) => {
-                    let stop = stops.remove(layer);
-                    layers.remove(layer);
-                    self.progress.note(&format!(
-                        "patch {} is left out: no motion to it was found",
-                        stop.patch
-                    ));
-                    dropped.push(stop.patch);
-                }
-            }
+        let path =
+            layered::shortest(cost, &continuous, &self.start, &layers, &mover, &mut |layer| {
+                let patch = stops[layer];
+                self.progress
+                    .note(&format!("patch {patch} is left out: no motion to it was found"));
+                dropped.push(patch);
+            });
+        if path.layers.is_empty() {
+            return Err(PipelineError::NoMotion { reachable: tour.len() });
         }
-        Err(PipelineError::NoMotion { reachable: tour.len() })
+        let legs: Vec<(usize, Leg)> = path
+            .layers
+            .iter()
+            .map(|&layer| stops[layer])
+            .zip(path.motions.into_iter().map(|motion| motion.path))
+            .collect();
+        Ok(Sequence {
+            jumps: legs.iter().filter(|(_, leg)| leg.is_jump()).count(),
+            legs,
+            samples: layers.iter().map(Vec::len).sum(),
+            dropped,
+        })
+    }
+
+    /// All samples at a stop, or where it has none at the heading that reached the patch.
+    fn layer(&self, stop: &Stop, values: &[f64]) -> Vec<Sample> {
+        let layer = self.layer_at(stop, values);
+        match self.reached[stop.patch] {
+            Some(sample) if layer.is_empty() => {
+                self.layer_at(&Stop { heading: sample.heading, ..*stop }, values)
+            }
+            _ => layer,
+        }
     }
 
     /// All samples at a stop; for a symmetric pad also those of the opposite heading.
-    fn layer(&self, stop: &Stop, values: &[f64]) -> Vec<Sample> {
+    fn layer_at(&self, stop: &Stop, values: &[f64]) -> Vec<Sample> {
         let mut layer = Vec::new();
         let turns: &[f64] =
             if self.cell.tool.symmetric { &[0.0, std::f64::consts::PI] } else { &[0.0] };
@@ -561,13 +573,6 @@ impl Context<'_> {
             self.cell.samples(&contact, stop.heading, values, &mut layer);
         }
         layer
-    }
-
-    fn link(&self, a: usize, b: usize) -> Link {
-        match self.graph.between(a, b) {
-            Some(edge) => Link::Surface { edge, reversed: self.graph.edges[edge].a != a },
-            None => Link::Jump,
-        }
     }
 }
 

@@ -129,7 +129,9 @@ pub enum PlanError {
         found: u32,
     },
     /// More knots than the wire takes.
-    #[error("the plan has {found} knots, the wire takes {MAX_KNOTS}: plan fewer patches at once (--crop)")]
+    #[error(
+        "the plan has {found} knots, the wire takes {MAX_KNOTS}: plan fewer patches at once (--crop)"
+    )]
     TooLong {
         /// How many.
         found: usize,
@@ -212,9 +214,8 @@ impl Plan {
         if self.held.len() > MAX_HELD_JOINTS {
             return Err(PlanError::TooManyHeld { found: self.held.len() });
         }
-        let knots: Vec<Knot> = (0..self.knots.len())
-            .map(|k| self.knots[k].wire(self.on_surface(k)))
-            .collect();
+        let knots: Vec<Knot> =
+            (0..self.knots.len()).map(|k| self.knots[k].wire(self.on_surface(k))).collect();
         let pose = self.base_pose();
         let (t, r) = (pose.translation.vector, pose.rotation.coords);
         let tool = serde_json::to_vec(&self.tool).unwrap_or_default();

@@ -41,7 +41,9 @@ pub enum PublishError {
     #[error("waiting for the executor: {0}")]
     Port(#[from] PortError),
     /// `--join knot` for a plan that continues none.
-    #[error("the plan does not continue another one: make it with `planner plan --continue PLAN@K`, or publish it with --join stop")]
+    #[error(
+        "the plan does not continue another one: make it with `planner plan --continue PLAN@K`, or publish it with --join stop"
+    )]
     ContinuesNothing,
     /// `--join knot` while nothing is executed.
     #[error("the executor executes no plan that could be joined: publish with --join stop")]
@@ -113,8 +115,8 @@ pub fn publish(
         Ok(None)
     };
     let is_admission = |k| matches!(k, EventKind::Accepted | EventKind::Rejected);
-    let admission =
-        wait(patience.admission, is_admission)?.ok_or(PublishError::NoAdmission(patience.admission))?;
+    let admission = wait(patience.admission, is_admission)?
+        .ok_or(PublishError::NoAdmission(patience.admission))?;
     if admission.kind == EventKind::Rejected.wire() {
         return Err(PublishError::Rejected(Box::new(admission)));
     }

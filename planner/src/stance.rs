@@ -101,10 +101,8 @@ pub fn candidates(
 ) -> Result<Vec<Candidate>, ArmError> {
     let centre = centroid(&scan.points);
     let mut stances = Vec::new();
-    let lift = search
-        .lift
-        .as_ref()
-        .filter(|(name, _)| arm.held_joints().iter().any(|h| &h.name == name));
+    let lift =
+        search.lift.as_ref().filter(|(name, _)| arm.held_joints().iter().any(|h| &h.name == name));
     let heights: Vec<Vec<(String, f64)>> = match lift {
         Some((name, values)) => values
             .iter()
@@ -124,7 +122,11 @@ pub fn candidates(
                         centre.y + distance * bearing.sin(),
                         bearing + std::f64::consts::PI + yaw,
                     ];
-                    stances.push((Stance { base, held: held.clone() }, bound.clone(), body.clone()));
+                    stances.push((
+                        Stance { base, held: held.clone() },
+                        bound.clone(),
+                        body.clone(),
+                    ));
                 }
             }
         }

@@ -99,8 +99,7 @@ impl ToolPath {
         }
         let b = &self.stations[i + 1];
         let mix = |x: Vector3<f64>, y: Vector3<f64>| x * (1.0 - share) + y * share;
-        let normal =
-            UnitVector3::new_normalize(mix(a.normal.into_inner(), b.normal.into_inner()));
+        let normal = UnitVector3::new_normalize(mix(a.normal.into_inner(), b.normal.into_inner()));
         let point = Point3::from(mix(a.point.coords, b.point.coords));
         contact_pose(&point, &normal, &mix(a.travel, b.travel), self.stand_off)
     }
@@ -169,7 +168,7 @@ impl Run<'_> {
         self.track.line.push(Point3::from(pose.translation.vector));
     }
 
-    /// The branch's joint vector at a pose, inside the limits and free of collision.
+    /// The branch's joint vector at a pose, inside the limits.
     fn solve(
         &self,
         pose: &Isometry3<f64>,
@@ -177,8 +176,7 @@ impl Run<'_> {
         near: &JointVector,
     ) -> Result<JointVector, TrackFailure> {
         let tip = pose * self.contact_in_tip.inverse();
-        let redundancy =
-            self.from.redundancy + share * (self.to.redundancy - self.from.redundancy);
+        let redundancy = self.from.redundancy + share * (self.to.redundancy - self.from.redundancy);
         let found = self.cell.arm.ik().solve_on(self.from.branch, &tip, redundancy, near);
         let q = found.ok_or(TrackFailure::Fold)?.q;
         if (0..MAX_DOF).any(|j| (q[j] - near[j]).abs() > MAX_STEP) {
@@ -186,9 +184,6 @@ impl Run<'_> {
         }
         if !self.cell.arm.within_margins(&q) {
             return Err(TrackFailure::Limit);
-        }
-        if !self.cell.world.is_free(&q, ToolContact::Allowed) {
-            return Err(TrackFailure::Collision);
         }
         Ok(q)
     }

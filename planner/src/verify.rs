@@ -64,6 +64,8 @@ pub struct Verification {
 
 /// Joints move at most this far between two looks at collisions. [rad] or [m]
 const COLLISION_STEP: f64 = 0.02;
+/// How far the pad is lifted off the surface before it must keep its margin, with some slack. [m]
+const LIFT: f64 = 0.052;
 /// Joints move at most this far between two looks at the pad. [rad] or [m]
 const PAD_STEP: f64 = 0.01;
 
@@ -85,7 +87,7 @@ pub fn verify(
     if !finite {
         return Verification { violations, ..Verification::default() };
     }
-    let (collisions, collision_checks) = collisions(plan, world, tick);
+    let (collisions, collision_checks) = collisions(plan, arm, world, tick);
     violations.extend(collisions);
     violations.sort_by_key(|v| v.knot);
 
@@ -136,9 +138,8 @@ fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
             continue;
         }
         for (j, name) in arm.joint_names().iter().enumerate() {
-            let velocity = before.map_or(0.0, |b| {
-                (knot.q[j] - b.q[j]) / ((knot.time_ns - b.time_ns) as f64 * 1e-9)
-            });
+            let velocity = before
+                .map_or(0.0, |b| (knot.q[j] - b.q[j]) / ((knot.time_ns - b.time_ns) as f64 * 1e-9));
             let limit = arm.limits()[j].velocity;
             if velocity.abs() > limit * (1.0 + 1e-9) {
                 let detail = format!("{name}: {velocity:.4} of {limit:.4}");
@@ -157,18 +158,19 @@ fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
 /// Exact collision checks along every segment.
 fn collisions(
     plan: &Plan,
+    arm: &Arm,
     world: &World,
     tick: &(dyn Fn() + Sync),
 ) -> (Vec<Violation>, usize) {
     let exact = world.exact();
+    let lifts = lifts(plan, arm);
     let per_segment: Vec<(Option<Violation>, usize)> = (1..plan.knots.len())
         .into_par_iter()
         .map(|k| {
             let (a, b) = (&plan.knots[k - 1], &plan.knots[k]);
             let steps = steps(&a.q, &b.q, COLLISION_STEP);
-            // A transfer begins and ends with the pad on the surface.
-            let on_surface = a.line.is_some() || b.line.is_some();
-            let contact = if on_surface { ToolContact::Allowed } else { ToolContact::Forbidden };
+            let may_touch = plan.on_surface(k) || lifts[k];
+            let contact = if may_touch { ToolContact::Allowed } else { ToolContact::Forbidden };
             let hit = (1..=steps).find_map(|s| {
                 let q = between(&a.q, &b.q, s as f64 / steps as f64);
                 exact.first_hit(&q, contact).map(|hit| Violation {
@@ -183,6 +185,27 @@ fn collisions(
         .collect();
     let checks = per_segment.iter().map(|(_, n)| n).sum();
     (per_segment.into_iter().filter_map(|(hit, _)| hit).collect(), checks)
+}
+
+/// Which segments of transfers, by the knot that ends them, lift the pad off the surface or set it
+/// down: those next to a knot on the surface, or at the plan's start, until the pad's centre is
+/// [`LIFT`] away. There it may still touch.
+fn lifts(plan: &Plan, arm: &Arm) -> Vec<bool> {
+    let contact = plan.tool.contact_in_tip();
+    let centre =
+        |k: usize| Point3::from((arm.tip_pose(&plan.knots[k].q) * contact).translation.vector);
+    let mut lifts = vec![false; plan.knots.len()];
+    let starts_in_contact = |k: usize| plan.knots[k].line.is_some() || k == 0;
+    for k in 0..plan.knots.len() {
+        if starts_in_contact(k) {
+            let near = |other: usize| (centre(other) - centre(k)).norm() <= LIFT;
+            let up = (k + 1..plan.knots.len()).take_while(|&n| !plan.on_surface(n) && near(n));
+            up.for_each(|n| lifts[n] = true);
+            let down = (1..=k).rev().take_while(|&n| !plan.on_surface(n) && near(n - 1));
+            down.for_each(|n| lifts[n] = true);
+        }
+    }
+    lifts
 }
 
 /// A pad pose on the surface and how far its centre is from the planned line.

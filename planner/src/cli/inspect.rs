@@ -89,7 +89,10 @@ fn tables(s: &Summary) -> String {
     let mut plan = Table::new();
     plan.load_style(UTF8_FULL_CONDENSED).set_header(["plan", ""]);
     plan.add_row(["robot", &format!("{} ({})", s.robot, s.fingerprint)]);
-    plan.add_row(["base x, y, yaw", &format!("{:.3} {:.3} {:.3}", s.base[0], s.base[1], s.base[2])]);
+    plan.add_row([
+        "base x, y, yaw",
+        &format!("{:.3} {:.3} {:.3}", s.base[0], s.base[1], s.base[2]),
+    ]);
     plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
     plan.add_row(["knots (on the surface)", &format!("{} ({})", s.knots, s.knots_on_surface)]);
     plan.add_row(["patches visited", &s.patches_visited.to_string()]);

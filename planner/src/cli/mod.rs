@@ -2,8 +2,11 @@
 
 mod bars;
 mod inspect;
+mod picture;
 mod plan;
 mod publish;
+
+pub use picture::{joint_axes, motion};
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -21,7 +24,11 @@ pub const VIOLATIONS: u8 = 3;
 
 /// Plans how a redundant arm sweeps a scanned surface, and publishes the plan.
 #[derive(Debug, Parser)]
-#[command(name = "planner", version, after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule and was not written.")]
+#[command(
+    name = "planner",
+    version,
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule and was not written."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

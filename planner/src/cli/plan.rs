@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Unit
 use nullsweep_robot::{ArmSpec, JointVector, MAX_DOF, Robot, Side};
 
 use super::bars::Bars;
+use super::picture::picture;
 use super::{OK, VIOLATIONS, write_json};
 use crate::collision::{Obstacle, ObstacleShape};
 use crate::cost::CostKind;
@@ -19,6 +20,7 @@ use crate::patches::PatchConfig;
 use crate::pipeline::{self, After, Figures, Job, Outcome, StanceChoice};
 use crate::plan::Plan;
 use crate::progress::Progress;
+use crate::report;
 use crate::scan::{self, CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan};
 use crate::simulate;
 use crate::stance::{Stance, StanceSearch};
@@ -51,7 +53,7 @@ pub(super) struct PlanArgs {
     /// Keep only this box of the floor frame as the surface to sweep, the rest stays an obstacle:
     /// xmin,ymin,zmin,xmax,ymax,zmax.
     #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
-    crop: Option<Numbers<6>>,
+    crop: Option<CropBox>,
 
     /// The robot's URDF; without it the PR2.
     #[arg(long, value_name = "FILE")]
@@ -229,8 +231,7 @@ fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
         write_json(figures, path)?;
     }
     if let Some(path) = &args.report {
-        crate::report::write(path, &outcome.report())
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        report::write(path, &picture(outcome, figures_table(figures)))?;
     }
     let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
     if !to_stdout {
@@ -254,13 +255,11 @@ fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
     Ok(VIOLATIONS)
 }
 
-fn table(f: &Figures) -> Table {
+/// The figures as name and value, for people.
+fn rows(f: &Figures) -> Vec<[String; 2]> {
     let v = &f.verification;
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
-    let mut row = |name: &str, value: String| {
-        table.add_row([name.to_owned(), value]);
-    };
+    let mut rows = Vec::new();
+    let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("points", f.points.to_string());
     row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
     row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
@@ -282,7 +281,25 @@ fn table(f: &Figures) -> Table {
     row("distance to the scan, p95, max", format!("{:.2}, {:.2} mm", distance.0, distance.1));
     row("violations", v.violations.len().to_string());
     row("calculation", format!("{:.2} s", f.calc_time_total_s));
+    for (stage, seconds) in &f.calc_time_s {
+        row(&format!("  {stage}"), format!("{seconds:.2} s"));
+    }
+    rows
+}
+
+fn table(figures: &Figures) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+    table.add_rows(rows(figures));
     table
+}
+
+fn figures_table(figures: &Figures) -> report::Table {
+    report::Table {
+        title: "Figures".into(),
+        columns: vec!["figure".into(), "value".into()],
+        rows: rows(figures).into_iter().map(Vec::from).collect(),
+    }
 }
 
 /// The scan to sweep, and all else that is there, in the floor frame.
@@ -297,26 +314,19 @@ fn scene(args: &PlanArgs, bars: &Bars) -> anyhow::Result<Scene> {
         Some(demo) => simulated(demo, args.seed),
         None => (read_scans(args, bars)?, None),
     };
-    let region = args.crop.map(|Numbers([a, b, c, d, e, f])| CropBox {
-        min: Point3::new(a, b, c),
-        max: Point3::new(d, e, f),
-    }).or(region);
-    let (whole, _) = scan::clean(&placed, &CleanConfig::default())?;
+    let region = args.crop.or(region);
+    let config = CleanConfig::default();
+    let (surface, surroundings) = match region {
+        None => (scan::clean(&placed, &config)?.0, Vec::new()),
+        Some(region) => {
+            let cut = scan::clean_region(&placed, &region, &config)?;
+            (cut.surface, cut.surroundings)
+        }
+    };
     let mut obstacles = vec![Obstacle::floor(Isometry3::identity())];
     if args.support_height > 0.0 {
-        obstacles.push(table_under(&whole, args.support_height));
+        obstacles.push(table_under(&surface, args.support_height));
     }
-    let Some(region) = region else {
-        return Ok(Scene { surface: whole, surroundings: Vec::new(), obstacles });
-    };
-    let surface = whole.cropped(&region);
-    ensure!(
-        !surface.points.is_empty(),
-        "no point of the scan lies in the crop box {:?} … {:?}",
-        region.min,
-        region.max
-    );
-    let surroundings = whole.points.iter().filter(|p| !region.contains(p)).copied().collect();
     Ok(Scene { surface, surroundings, obstacles })
 }
 
@@ -338,20 +348,21 @@ fn read_scans(args: &PlanArgs, bars: &Bars) -> anyhow::Result<PlacedScan> {
     );
     let options = ReadOptions { scale: args.scale, seed: args.seed, ..ReadOptions::default() };
     let mut joined = PlacedScan::default();
-    let mut first_pose: Option<Isometry3<f64>> = None;
+    let mut shared: Option<Placement> = None;
     for (i, path) in args.scans.iter().enumerate() {
         let raw = scan::read(path, &options)?;
         for warning in &raw.warnings {
             bars.note(&format!("{}: {warning}", path.display()));
         }
-        let placement = match (args.sensor_pose.get(i), first_pose) {
+        let placement = match (args.sensor_pose.get(i), &shared) {
             (Some(pose), _) => Placement::SensorPose(isometry(pose)?),
             // Further scans without a pose of their own share the first one's frame.
-            (None, Some(pose)) => Placement::SensorPose(pose),
+            (None, Some(frame)) => frame.clone(),
             (None, None) => upright(args)?,
         };
         let (placed, pose) = scan::place(&raw, &placement);
-        first_pose = Some(first_pose.unwrap_or(pose));
+        let sensor = placed.views[0].sensor;
+        shared.get_or_insert(Placement::Frame { pose, sensor });
         joined.join(placed);
     }
     Ok(joined)

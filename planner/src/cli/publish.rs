@@ -34,8 +34,7 @@ pub(super) struct PublishArgs {
 
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     let plan = Plan::read(&args.plan)?;
-    let join =
-        args.join.unwrap_or(if plan.continues.is_some() { Join::Knot } else { Join::Stop });
+    let join = args.join.unwrap_or(if plan.continues.is_some() { Join::Knot } else { Join::Stop });
     // An end comes after the plans before it and may be slowed down: be generous.
     let end = args.wait.then(|| Duration::from_secs_f64(10.0 * plan.duration() + 600.0));
     let patience = Patience { admission: Duration::from_secs_f64(args.timeout), end };

@@ -9,6 +9,7 @@ use super::{Hit, Margins, ToolContact, With};
 use crate::tool::Tool;
 use nalgebra::{Isometry3, Point3};
 use nullsweep_robot::{Arm, JointVector, Robot};
+use parry3d_f64::bounding_volume::BoundingVolume;
 use parry3d_f64::math::{Pose, Rot3, Vec3};
 use parry3d_f64::query;
 use parry3d_f64::shape::{Shape, SharedShape};
@@ -172,7 +173,12 @@ impl<'a> Exact<'a> {
                 (false, _) => margins.environment,
             };
             let shape = &*scene.shapes.parts[i].shape;
+            // Points outside the shape's bounds, grown by the margin, are farther than it.
+            let bounds = shape.compute_aabb(&poses[i]).loosened(outside);
             for p in &scene.points {
+                if !bounds.contains_local_point(Vec3::new(p.x, p.y, p.z)) {
+                    continue;
+                }
                 let distance = signed_distance(shape, &poses[i], p);
                 let margin = match may_touch && distance < outside && in_prism(p) {
                     true if is_pad => continue,

@@ -39,7 +39,7 @@ struct Lever {
 }
 
 /// A motion is halved at most this often before it counts as not proven.
-const HALVINGS: u32 = 16;
+const HALVINGS: u32 = 7;
 
 impl Slack {
     pub(crate) const NONE: Self =
@@ -160,7 +160,7 @@ impl World {
     /// Whether the whole straight joint line from `a` to `b` is proven free: by bisection until, at
     /// each piece's middle, every distance exceeds its margin by what the bodies can move from
     /// there to the piece's ends. False if a collision is found, or if no proof is found within
-    /// 16 halvings (a motion that grazes a margin).
+    /// 7 halvings (a motion that grazes a margin).
     #[must_use]
     pub fn motion_free(&self, a: &JointVector, b: &JointVector, contact: ToolContact) -> bool {
         let ways = self.reach.slack(&self.bodies, a, b);
