@@ -6,12 +6,12 @@
 //! jump through free space – which is dear, while the cost of the straight joint line is cheap and
 //! never above it. So the search is lazy: the path that is shortest under estimates is found, the
 //! motions on it are made, their true costs (or their failure) replace the estimates, and so on.
-//! An estimate is the straight cost times the least ratio of true to straight cost seen so far
+//! An estimate is the straight cost times the mean ratio of true to straight cost seen so far
 //! between the same two layers: the detour of the surface line is much the same for all samples.
 //! The search ends when no path's estimate is lower than the best path made by more than
-//! [`GAP`].
+//! [`GAP`], and every motion of that path is proven free of collision between its joint vectors.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nullsweep_robot::{JointVector, MAX_DOF};
 use rayon::prelude::*;
@@ -45,13 +45,17 @@ pub struct Motion<M> {
 /// What the search asks of its surroundings. Layers are named by their place in the tour.
 pub trait Moves: Sync {
     /// What a motion is stored as.
-    type Path: Send;
+    type Path: Send + Sync;
 
     /// How a layer can be joined to a later one.
     fn link(&self, from: usize, to: usize) -> Link;
 
     /// Follows the surface from a sample to another; `None` where that fails.
     fn track(&self, link: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<Self::Path>>;
+
+    /// Whether a motion that was made is free of collision all along: dearer than making it, so it
+    /// is asked only for the motions of a path that would be the result.
+    fn is_proven(&self, path: &Self::Path) -> bool;
 
     /// Jumps from a sample (`None`: from the source) to another; `None` where no motion is
     /// found.
@@ -79,9 +83,9 @@ pub struct LayeredPath<M> {
 }
 
 /// The search ends when it could gain no more than this share of the cost.
-const GAP: f64 = 0.002;
+const GAP: f64 = 0.005;
 /// Most searches after a path was made.
-const MAX_ROUNDS: usize = 200;
+const MAX_ROUNDS: usize = 100;
 /// Jumps made into one layer after which no others are tried: they are dear, and their cost hardly
 /// depends on the sample.
 const MAX_JUMPS: usize = 3;
@@ -104,6 +108,7 @@ pub fn shortest<C: Cost, M: Moves>(
     let problem = Problem { cost, continuous, source, layers, moves };
     let mut search = Search::new(problem, visited);
     let mut made: HashMap<Key, Motion<M::Path>> = HashMap::new();
+    let mut proven: HashSet<Key> = HashSet::new();
     let (mut jumps, mut failed_jumps) = (vec![0usize; layers.len()], vec![0usize; layers.len()]);
     let mut best: Option<(f64, Vec<Key>)> = None;
     let (mut rounds, mut tried, mut dirty) = (0, 0, 0);
@@ -114,8 +119,26 @@ pub fn shortest<C: Cost, M: Moves>(
         let open: Vec<usize> = (0..keys.len()).filter(|&p| !made.contains_key(&keys[p])).collect();
         let enough = best.as_ref().is_some_and(|(cost, _)| estimate >= cost * (1.0 - GAP));
         if open.is_empty() || enough || (best.is_some() && rounds > MAX_ROUNDS) {
-            let (_, keys) = best.filter(|_| !open.is_empty()).unwrap_or((0.0, keys));
-            return search.finish(&keys, made, rounds, tried);
+            let (_, keys) = best.take().filter(|_| !open.is_empty()).unwrap_or((0.0, keys));
+            let doubtful: Vec<usize> =
+                (0..keys.len()).filter(|&p| !proven.contains(&keys[p])).collect();
+            let proofs: Vec<bool> =
+                doubtful.par_iter().map(|&p| moves.is_proven(&made[&keys[p]].path)).collect();
+            dirty = usize::MAX;
+            for (&p, is_proven) in doubtful.iter().zip(&proofs) {
+                if *is_proven {
+                    proven.insert(keys[p]);
+                } else {
+                    let (a, b) = (keys[p].from.map_or(0, |(_, a)| a), keys[p].to.1);
+                    made.remove(&keys[p]);
+                    search.into[p].fall_back_to_jump(a, b);
+                    dirty = dirty.min(p);
+                }
+            }
+            if dirty == usize::MAX {
+                return search.finish(&keys, made, rounds, tried);
+            }
+            continue;
         }
         tried += open.len();
         let attempts: Vec<Option<Motion<M::Path>>> =
@@ -295,7 +318,7 @@ impl<C: Cost, M: Moves> Problem<'_, C, M> {
             straight: Vec::with_capacity(size),
             kind: Vec::with_capacity(size),
             lift: self.moves.jump_estimate(0.0) as f32,
-            least_ratio: [f32::INFINITY; 2],
+            ratios: [(0.0, 0.0); 2],
         };
         for (q, from) in rows {
             for to in &self.layers[to] {
@@ -332,8 +355,8 @@ struct Edges {
     kind: Vec<Kind>,
     /// What a jump costs besides its way.
     lift: f32,
-    /// Least ratio of true to straight cost seen here, of tracks and of jumps; ∞: none seen.
-    least_ratio: [f32; 2],
+    /// Ratios of true to straight cost seen here, of tracks and of jumps: their sum and number.
+    ratios: [(f32, f32); 2],
 }
 
 impl Edges {
@@ -342,9 +365,9 @@ impl Edges {
     }
 
     fn guess(&self, kind: Kind, straight: f32) -> f32 {
-        let ratio = |of: usize| match self.least_ratio[of] {
-            seen if seen.is_finite() => seen.max(1.0),
-            _ => 1.0,
+        let ratio = |of: usize| match self.ratios[of] {
+            (_, 0.0) => 1.0,
+            (sum, seen) => sum / seen,
         };
         match kind {
             Kind::Track => straight * ratio(0),
@@ -360,12 +383,11 @@ impl Edges {
         let ratio = way / self.straight[at].max(1e-6);
         self.kind[at] = Kind::Known;
         self.estimate[at] = cost as f32;
-        if ratio < self.least_ratio[of] {
-            self.least_ratio[of] = ratio;
-            for i in 0..self.kind.len() {
-                if self.kind[i] != Kind::Known {
-                    self.estimate[i] = self.guess(self.kind[i], self.straight[i]);
-                }
+        self.ratios[of].0 += ratio;
+        self.ratios[of].1 += 1.0;
+        for i in 0..self.kind.len() {
+            if self.kind[i] != Kind::Known {
+                self.estimate[i] = self.guess(self.kind[i], self.straight[i]);
             }
         }
     }
@@ -429,6 +451,9 @@ mod tests {
         fn track(&self, _: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<()>> {
             let extra = if self.straight_tracks { 0.0 } else { surcharge(from, to) };
             extra.is_finite().then(|| Motion { cost: straight(&from.q, &to.q) + extra, path: () })
+        }
+        fn is_proven(&self, (): &()) -> bool {
+            true
         }
         fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
             let start = from.map_or([0.0; MAX_DOF], |s| s.q);

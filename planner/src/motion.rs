@@ -94,6 +94,11 @@ impl<C: Cost> Moves for Mover<'_, C> {
         Some(Motion { cost, path: Leg { joints: track.joints, line } })
     }
 
+    fn is_proven(&self, leg: &Leg) -> bool {
+        // A jump's segments were proven when it was made.
+        leg.is_jump() || self.cell.is_proven(&leg.joints)
+    }
+
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<Leg>> {
         let start = from.map_or(self.source, |s| s.q);
         let joints = transfer::jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;

@@ -113,8 +113,8 @@ impl ToolPath {
 
 impl Workcell<'_> {
     /// Follows the path from one sample to another on one branch, the redundancy parameter
-    /// changing evenly, and checks limits and collisions on the way. Between two joint vectors
-    /// of the result the pad stays within 0.1 mm of the line.
+    /// changing evenly, and checks limits and collisions at every joint vector of the result;
+    /// [`Self::is_proven`] looks between them. There the pad stays within 0.1 mm of the line.
     ///
     /// # Errors
     /// Says what ended the branch, see [`TrackFailure`].
@@ -146,6 +146,12 @@ impl Workcell<'_> {
         let misses = (0..MAX_DOF).any(|j| wrap(arrived[j] - to.q[j]).abs() > 1e-6);
         if misses { Err(TrackFailure::Elsewhere) } else { Ok(run.track) }
     }
+
+    /// Whether the whole motion along the track, the pad on the surface, is free of collision.
+    #[must_use]
+    pub fn is_proven(&self, track: &[JointVector]) -> bool {
+        track.windows(2).all(|w| self.world.motion_free(&w[0], &w[1], ToolContact::Allowed))
+    }
 }
 
 /// One run of [`Workcell::follow`].
@@ -168,7 +174,7 @@ impl Run<'_> {
         self.track.line.push(Point3::from(pose.translation.vector));
     }
 
-    /// The branch's joint vector at a pose, inside the limits.
+    /// The branch's joint vector at a pose, inside the limits and free of collision.
     fn solve(
         &self,
         pose: &Isometry3<f64>,
@@ -184,6 +190,9 @@ impl Run<'_> {
         }
         if !self.cell.arm.within_margins(&q) {
             return Err(TrackFailure::Limit);
+        }
+        if !self.cell.world.is_free(&q, ToolContact::Allowed) {
+            return Err(TrackFailure::Collision);
         }
         Ok(q)
     }
@@ -210,9 +219,6 @@ impl Run<'_> {
             let q = self.solve(&pose, self.path.share(i, share), &a.1)?;
             self.span(i, a, (share, q), pose, halvings - 1)?;
             return self.span(i, (share, q), b, b_pose, halvings - 1);
-        }
-        if !self.cell.world.motion_free(&a.1, &b.1, ToolContact::Allowed) {
-            return Err(TrackFailure::Collision);
         }
         self.push(b.1, b_pose);
         Ok(())
