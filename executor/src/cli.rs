@@ -11,12 +11,14 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand};
 use nullsweep_ipc_types::ports::Ipc;
-use nullsweep_ipc_types::{CommandKind, Fault, Mode, Response, Verdict, service};
+use nullsweep_ipc_types::{
+    CommandKind, Fault, HISTOGRAM_BUCKETS, Mode, Response, Verdict, bucket_upper_ns, service,
+};
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use crate::executor::{Config, Summary, run};
+use crate::executor::{Config, Summary, quantile_ns, run};
 use crate::guard::Guard;
 use crate::record::replay;
 
@@ -309,6 +311,14 @@ impl std::fmt::Display for Answer<'_> {
     }
 }
 
+/// A quantile in words.
+fn below(histogram: &[u32; HISTOGRAM_BUCKETS], share: f64) -> String {
+    match quantile_ns(histogram, share) {
+        Some(bound) => format!("< {:.1} µs", bound as f64 * 1e-3),
+        None => format!("> {:.1} µs", bucket_upper_ns(HISTOGRAM_BUCKETS - 2) as f64 * 1e-3),
+    }
+}
+
 /// A summary in words.
 struct Told(Summary);
 
@@ -318,14 +328,21 @@ impl std::fmt::Display for Told {
         write!(
             f,
             "{} cycles, {} deadlines missed; armed for {} cycles: {} system-heap calls, {} page \
-             faults; {} blocks from its own pool; {} port failures",
+             faults; {} blocks from its own pool; {} port failures; wake-up lateness p50 {}, p99 \
+             {}, p99.9 {}; compute time p50 {}, p99 {}, p99.9 {}",
             s.cycles,
             s.missed,
             s.armed_cycles,
             s.heap_calls,
             s.page_faults,
             s.pool_calls,
-            s.failures
+            s.failures,
+            below(&s.lateness, 0.5),
+            below(&s.lateness, 0.99),
+            below(&s.lateness, 0.999),
+            below(&s.compute, 0.5),
+            below(&s.compute, 0.99),
+            below(&s.compute, 0.999),
         )
     }
 }

@@ -79,6 +79,12 @@ impl<H: Hardware> Driver<H> {
         self.failures
     }
 
+    /// Wake-up lateness and compute time a cycle, in buckets.
+    #[must_use]
+    pub fn histograms(&self) -> ([u32; HISTOGRAM_BUCKETS], [u32; HISTOGRAM_BUCKETS]) {
+        (self.lateness, self.compute)
+    }
+
     /// The mode after the last cycle.
     #[must_use]
     pub fn mode(&self) -> Mode {

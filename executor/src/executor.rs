@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use nullsweep_ipc_types::ports::{Ipc, IpcError, now_ns};
-use nullsweep_ipc_types::{MAX_HELD_JOINTS, Mode};
+use nullsweep_ipc_types::{HISTOGRAM_BUCKETS, MAX_HELD_JOINTS, Mode, bucket_upper_ns};
 use nullsweep_robot::{Arm, JointKind};
 
 use crate::admit::Rules;
@@ -101,6 +101,25 @@ pub struct Summary {
     pub page_faults: i64,
     /// Reads and writes at the endpoint that failed.
     pub failures: u64,
+    /// Wake-up lateness, see [`nullsweep_ipc_types::bucket_upper_ns`].
+    pub lateness: [u32; HISTOGRAM_BUCKETS],
+    /// Compute time a cycle.
+    pub compute: [u32; HISTOGRAM_BUCKETS],
+}
+
+/// The time below which a share of a histogram's samples lies: the upper bound of their bucket,
+/// `None` past the last bound. \[ns\]
+#[must_use]
+pub fn quantile_ns(histogram: &[u32; HISTOGRAM_BUCKETS], share: f64) -> Option<u64> {
+    let total: u64 = histogram.iter().map(|n| u64::from(*n)).sum();
+    let mut below = 0u64;
+    for (bucket, count) in histogram[..HISTOGRAM_BUCKETS - 1].iter().enumerate() {
+        below += u64::from(*count);
+        if below as f64 >= share * total as f64 {
+            return Some(bucket_upper_ns(bucket));
+        }
+    }
+    None
 }
 
 /// Runs an executor for `arm` until `stop` is set, then stops on the path, disables the motors,
@@ -207,6 +226,7 @@ fn run_loop<H: Hardware>(
     summary.heap_calls = pool.heap_calls;
     summary.pool_calls = pool.pool_calls;
     summary.failures = driver.failures();
+    (summary.lateness, summary.compute) = driver.histograms();
     down.store(true, Ordering::Release);
     summary
 }
@@ -257,4 +277,21 @@ fn spawn<'scope, T: Send + 'scope>(
 
 fn joined<T>(name: &'static str, thread: Running<'_, T>) -> Result<T, ExecutorError> {
     thread.join().map_err(|_| ExecutorError::Died(name))?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_upper_bounds() {
+        let mut histogram = [0; HISTOGRAM_BUCKETS];
+        assert_eq!(quantile_ns(&histogram, 0.5), Some(bucket_upper_ns(0)));
+        histogram[3] = 98;
+        histogram[10] = 1;
+        histogram[HISTOGRAM_BUCKETS - 1] = 1;
+        assert_eq!(quantile_ns(&histogram, 0.98), Some(bucket_upper_ns(3)));
+        assert_eq!(quantile_ns(&histogram, 0.99), Some(bucket_upper_ns(10)));
+        assert_eq!(quantile_ns(&histogram, 0.995), None);
+    }
 }

@@ -30,7 +30,7 @@ mod worker;
 pub use admit::{Held, Join, Rejection, Rules, ValidPlan, admit};
 pub use cli::main_with;
 pub use driver::Driver;
-pub use executor::{Config, ExecutorError, Summary, run};
+pub use executor::{Config, ExecutorError, Summary, quantile_ns, run};
 pub use guard::{Guard, JointGuard, Joints};
 pub use hardware::{Hardware, IpcHardware, Loopback};
 pub use interpolate::{PlanKnot, Sample, reach, sample, top_speed};
