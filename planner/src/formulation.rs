@@ -165,7 +165,8 @@ impl Problem<'_> {
         edges.iter().map(|&e| Stop { patch, heading: self.graph.edges[e].leaving(patch) }).collect()
     }
 
-    /// The pad heads where it goes next; at the end, and before a jump, where it came from.
+    /// The pad heads where it goes next (but for the edge's turn); at the end, and before a jump,
+    /// where it came from.
     fn headings_along(&self, order: &[usize]) -> Vec<Stop> {
         let edge = |a: usize, b: usize| self.graph.between(a, b).map(|e| &self.graph.edges[e]);
         (0..order.len())

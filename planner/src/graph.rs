@@ -10,6 +10,10 @@ use crate::reach::{
 use crate::surface::{Surface, SurfacePoint};
 use crate::track::ToolPath;
 
+/// Turns of the pad from the direction of travel that are tried, the paper's own first: the long
+/// side across the travel. [°]
+const TURNS: [f64; 6] = [0.0, 30.0, -30.0, 60.0, -60.0, 90.0];
+
 /// How the graph is built.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraphConfig {
@@ -42,6 +46,9 @@ pub struct Edge {
     pub heading_a: f64,
     /// Heading at `b` of a tool that travels from `a` to `b`. [rad]
     pub heading_b: f64,
+    /// Turn of the pad from the direction of travel at which the edge can be followed: 0 where
+    /// that goes. [rad]
+    pub turn: f64,
 }
 
 impl Edge {
@@ -57,10 +64,11 @@ impl Edge {
         if patch == self.a { self.b } else { self.a }
     }
 
-    /// The heading at one end of a tool that leaves along the edge. [rad]
+    /// The pad's heading at one end when it leaves along the edge, its turn included. [rad]
     #[must_use]
     pub fn leaving(&self, patch: usize) -> f64 {
-        if patch == self.a { self.heading_a } else { self.heading_b + std::f64::consts::PI }
+        let back = std::f64::consts::PI;
+        self.turn + if patch == self.a { self.heading_a } else { self.heading_b + back }
     }
 }
 
@@ -105,8 +113,12 @@ pub fn build(
     let edges: Vec<Edge> = pairs
         .par_iter()
         .map(|&(a, b)| {
-            let edge = edge(surface, patches, a, b, config.line_step)
-                .filter(|edge| can_be_followed(cell, patches, edge, &values));
+            let edge = edge(surface, patches, a, b, config.line_step).and_then(|edge| {
+                TURNS
+                    .iter()
+                    .map(|degrees| Edge { turn: f64::to_radians(*degrees), ..edge.clone() })
+                    .find(|edge| can_be_followed(cell, patches, edge, &values))
+            });
             tick();
             edge
         })
@@ -158,28 +170,30 @@ fn edge(surface: &Surface, patches: &[Patch], a: usize, b: usize, step: f64) -> 
         heading_a: heading_of(&line[0].normal, &(line[1].point - line[0].point)),
         heading_b: heading_of(&line[last].normal, &(line[last].point - line[last - 1].point)),
         line,
+        turn: 0.0,
     })
 }
 
 /// Whether one branch at one of the redundancy values can be followed along the edge, the pad
-/// heading along it.
+/// turned from it as it says.
 fn can_be_followed(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, values: &[f64]) -> bool {
-    let path = ToolPath::along(edge, false, edge.heading_a, edge.heading_b, cell.tool.stand_off);
+    let (first, last) = (edge.heading_a + edge.turn, edge.heading_b + edge.turn);
+    let path = ToolPath::along(edge, false, first, last, cell.tool.stand_off);
     let pose = |i: usize, heading: f64| {
         let patch = &patches[i];
         let travel = direction(&patch.normal, heading);
         contact_pose(&patch.centre, &patch.normal, &travel, cell.tool.stand_off)
     };
-    let (start, end) = (pose(edge.a, edge.heading_a), pose(edge.b, edge.heading_b));
+    let (start, end) = (pose(edge.a, first), pose(edge.b, last));
     let (mut from, mut to) = (Vec::new(), Vec::new());
     values.iter().any(|&value| {
         from.clear();
         to.clear();
-        cell.samples(&start, edge.heading_a, &[value], &mut from);
+        cell.samples(&start, first, &[value], &mut from);
         if from.is_empty() {
             return false;
         }
-        cell.samples(&end, edge.heading_b, &[value], &mut to);
+        cell.samples(&end, last, &[value], &mut to);
         from.iter()
             .any(|f| to.iter().any(|t| t.branch == f.branch && cell.follow(&path, f, t).is_ok()))
     })

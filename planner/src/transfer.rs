@@ -74,8 +74,9 @@ pub fn jump(
     Some(path)
 }
 
-/// Backs the tool off by `distance` \[m\] along the surface normal (the contact frame's −z), its
-/// orientation kept, from the contact at `q`: waypoints from `q` on, 5 mm apart.
+/// Backs the tool off by `distance` \[m\], its orientation kept, from the contact at `q`:
+/// waypoints from `q` on, 5 mm apart. Along the surface normal (the contact frame's −z) if that
+/// goes, else slanted upwards, towards the robot, or both.
 ///
 /// The arm takes the shortest joint motion, so it stays on its branch. The pad may touch the
 /// surface until it has left it. A lift that is blocked (a limit, a collision) is cut short there
@@ -89,7 +90,23 @@ pub fn retract(
     distance: f64,
 ) -> Option<Vec<JointVector>> {
     let contact = arm.tip_pose(q) * tool.contact_in_tip();
-    let away = contact.rotation * -Vector3::z();
+    let normal = contact.rotation * -Vector3::z();
+    let up = Vector3::z();
+    let home = -contact.translation.vector.component_mul(&Vector3::new(1.0, 1.0, 0.0)).normalize();
+    [normal, normal + up, normal + home, normal + up + home]
+        .into_iter()
+        .filter_map(|way| way.try_normalize(0.1))
+        .find_map(|away| back_off(world, arm, q, &away, distance))
+}
+
+/// [`retract`] in one direction.
+fn back_off(
+    world: &World,
+    arm: &Arm,
+    q: &JointVector,
+    away: &Vector3<f64>,
+    distance: f64,
+) -> Option<Vec<JointVector>> {
     let start = arm.tip_pose(q);
     let mut path = vec![*q];
     // Waypoints up to here, the first one at which the tool keeps its margin.
