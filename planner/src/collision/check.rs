@@ -74,11 +74,13 @@ impl World {
             None => self.margins.environment,
         };
         let need = margin + slack;
+        let at = pose.then(&shape.place);
         shape.tree.all(
             |s| self.field.is_farther(&pose.apply(&s.centre), s.radius + need),
             |s| {
                 self.field.all_within(&pose.apply(&s.centre), s.radius + need, |p| {
-                    self.point_value(shape, pose, contact, p, slack) >= slack
+                    shape.solid.distance_bound(&at.apply_inverse(p)) >= need
+                        || self.point_value(shape, pose, contact, p, slack) >= slack
                 })
             },
         )
@@ -183,6 +185,10 @@ fn is_pair_clear(
     need: f64,
 ) -> bool {
     let local = place.inverse_then(relative);
+    let pose = local.then(&shape.place);
+    if solid.is_separated(&shape.solid, &pose, need) {
+        return true;
+    }
     let mut seen = 0;
     shape.tree.all(
         |s| {
@@ -190,7 +196,7 @@ fn is_pair_clear(
             seen <= SPHERES && solid.distance_bound(&local.apply(&s.centre)) >= s.radius + need
         },
         |_| false,
-    ) || gjk_distance(&local.then(&shape.place), other, &shape.shape) >= need
+    ) || gjk_distance(&pose, other, &shape.shape) >= need
 }
 
 /// Distance between two shapes, the second at `pose` in the first's frame; 0 if they overlap. \[m\]

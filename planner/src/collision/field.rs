@@ -1,21 +1,25 @@
 //! The scan as an obstacle: a two-level grid of distances in front of the raw points.
 //!
-//! Both levels hold the distance of the grid's nodes to the nearest raw point, so the bound at any
-//! place is the node's distance less the way to the node: never more than the true distance. What
-//! the grid cannot prove is decided on the raw points, kept in cells.
+//! Both levels hold a lower bound of the distance of the grid's nodes to the nearest raw point, so
+//! the bound at any place is the node's less the way to the node: never more than the true
+//! distance. What the grid cannot prove is decided on the raw points, kept in cells.
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Point3, Vector3};
 
 /// The points that the moving links can reach, in the root frame.
 #[derive(Debug, Default)]
 pub(crate) struct Field {
     points: Vec<Vector3<f64>>,
+    /// Bounds of the points, for what is far outside of the grids. \[m\]
+    min: Vector3<f64>,
+    max: Vector3<f64>,
     coarse: Grid,
     fine: Grid,
     /// Nodes of the fine grid without a point this near hold this value. \[m\]
     fine_cap: f64,
-    /// First point of each fine-grid cell (nodes are the cells' centres); one more at the end.
+    /// Cells of the points: nodes are the cells' centres, distances are not kept.
+    cells: Grid,
+    /// First point of each cell; one more at the end.
     starts: Vec<u32>,
 }
 
@@ -33,13 +37,17 @@ struct Grid {
 /// Wanted spacing of the fine nodes; grows with the scan's volume. \[m\]
 const FINE: f64 = 0.01;
 /// The fine band reaches this many nodes from a point.
-const BAND: usize = 4;
+const BAND: usize = 3;
 /// Most nodes of the fine grid.
 const FINE_NODES: f64 = 3.0e6;
 /// Coarse nodes stand this many fine spacings apart, and this far beyond the points.
-const COARSE_STEP: f64 = 6.0;
+const COARSE_STEP: f64 = 2.0;
+/// Most nodes of the coarse grid.
+const COARSE_NODES: f64 = 3.0e5;
 /// How far the coarse grid reaches beyond the points. \[m\]
-const COARSE_BORDER: f64 = 0.4;
+const COARSE_BORDER: f64 = 0.3;
+/// Cells of the points are this many fine spacings wide.
+const CELL: f64 = 2.5;
 /// Covers the rounding of stored f32 distances below 10 m. \[m\]
 const ROUNDING: f64 = 2e-6;
 
@@ -66,11 +74,13 @@ impl Field {
             h *= 1.1;
         }
         let mut fine = Grid::new(min, max, h, (BAND + 1) as f64 * h);
-        let starts = sort_into_cells(&fine, &mut points);
+        let mut cells = Grid::new(min, max, CELL * h, CELL * h);
+        let starts = sort_into_cells(&cells, &mut points);
+        cells.distance = Vec::new();
         let fine_cap = (BAND as f64 + 0.5) * h;
         fine.scatter(&points, fine_cap);
         let coarse = Grid::coarse(min, max, h, &points);
-        Self { points, coarse, fine, fine_cap, starts }
+        Self { points, min, max, coarse, fine, fine_cap, cells, starts }
     }
 
     /// The points kept.
@@ -82,6 +92,7 @@ impl Field {
     #[inline]
     pub(crate) fn is_farther(&self, p: &Vector3<f64>, need: f64) -> bool {
         self.points.is_empty()
+            || (need >= 0.0 && self.box_distance_squared(p) >= need * need)
             || self.coarse.bound(p) >= need
             || (need < self.fine_cap && self.fine.bound(p) >= need)
     }
@@ -92,7 +103,14 @@ impl Field {
         if self.points.is_empty() {
             return f64::INFINITY;
         }
-        self.coarse.bound(p).max(self.fine.bound(p)).max(0.0)
+        let outside = self.box_distance_squared(p).sqrt();
+        outside.max(self.coarse.bound(p)).max(self.fine.bound(p))
+    }
+
+    /// Squared distance to the bounds of the points. \[m²\]
+    #[inline]
+    fn box_distance_squared(&self, p: &Vector3<f64>) -> f64 {
+        (self.min - p).sup(&(p - self.max)).map(|x| x.max(0.0)).norm_squared()
     }
 
     /// Calls `test` on every point within `radius` of `p`, until it is false; whether it never was.
@@ -106,7 +124,7 @@ impl Field {
         if self.points.is_empty() {
             return true;
         }
-        let grid = &self.fine;
+        let grid = &self.cells;
         let low = grid.clamped_cell(&(p - Vector3::repeat(radius)));
         let high = grid.clamped_cell(&(p + Vector3::repeat(radius)));
         let squared = radius * radius;
@@ -142,24 +160,44 @@ impl Grid {
         }
     }
 
-    /// The grid for the far field: the distance from every node to its nearest point.
+    /// The grid for the far field: exact distances between nodes, less the way from a point to its
+    /// node.
     fn coarse(min: Vector3<f64>, max: Vector3<f64>, fine: f64, points: &[Vector3<f64>]) -> Self {
-        let mut grid = Self::new(min, max, COARSE_STEP * fine, COARSE_BORDER);
-        let entries: Vec<[f64; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
-        let tree: ImmutableKdTree<f64, 3> =
-            ImmutableKdTree::new_from_slice(&entries).expect("finite points make a tree");
-        for z in 0..grid.size[2] {
-            for y in 0..grid.size[1] {
-                for x in 0..grid.size[0] {
-                    let node = grid.node(x, y, z);
-                    let nearest = tree
-                        .query(&[node.x, node.y, node.z])
-                        .nearest_one::<SquaredEuclidean<f64>>()
-                        .execute();
-                    let index = (z * grid.size[1] + y) * grid.size[0] + x;
-                    grid.distance[index] = (nearest.distance.sqrt() - ROUNDING) as f32;
+        let extent = (max - min).map(|x| x + 2.0 * COARSE_BORDER);
+        let mut spacing = COARSE_STEP * fine;
+        while extent.product() > COARSE_NODES * spacing.powi(3) {
+            spacing *= 1.1;
+        }
+        let mut grid = Self::new(min, max, spacing, COARSE_BORDER);
+        for p in points {
+            let [x, y, z] = grid.clamped_cell(p);
+            grid.distance[(z * grid.size[1] + y) * grid.size[0] + x] = 0.0;
+        }
+        // Squared distances in spacings, one axis after the other: small whole numbers, so exact.
+        let [nx, ny, nz] = grid.size;
+        for (count, stride) in [(nx, 1), (ny, nx), (nz, nx * ny)] {
+            let mut line = vec![0.0f32; count];
+            for start in (0..grid.distance.len()).filter(|i| i / stride % count == 0) {
+                for (k, value) in line.iter_mut().enumerate() {
+                    *value = grid.distance[start + k * stride];
+                }
+                if line.iter().all(|v| v.is_infinite()) {
+                    continue;
+                }
+                for k in 0..count {
+                    let mut least = f32::INFINITY;
+                    for (m, value) in line.iter().enumerate() {
+                        let apart = k as f32 - m as f32;
+                        let squared = value + apart * apart;
+                        least = if squared < least { squared } else { least };
+                    }
+                    grid.distance[start + k * stride] = least;
                 }
             }
+        }
+        let off_node = 0.5 * 3f64.sqrt() * spacing + ROUNDING;
+        for d in &mut grid.distance {
+            *d = (f64::from(*d).sqrt() * spacing - off_node) as f32;
         }
         grid
     }

@@ -173,7 +173,8 @@ impl World {
         while let Some((from, to, depth)) = open.pop_front() {
             let middle = 0.5 * (from + to);
             let q: JointVector = std::array::from_fn(|j| a[j] + middle * (b[j] - a[j]));
-            if self.is_clear(&q, contact, &ways.scaled(0.5 * (to - from))) {
+            let slack = ways.scaled(0.5 * (to - from));
+            if self.is_clear(&q, contact, &slack) {
                 continue;
             }
             if depth == HALVINGS || !self.is_free(&q, contact) {

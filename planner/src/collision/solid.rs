@@ -1,5 +1,6 @@
 //! Convex solids in their own frame: signed distances for the fast check, parry's shapes for GJK.
 
+use super::frame::Frame;
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::math::Vec3;
 use parry3d_f64::query::PointQuery;
@@ -123,6 +124,42 @@ impl Solid {
                 Vector3::new(f64::INFINITY, f64::INFINITY, 0.0),
             ),
         }
+    }
+
+    /// Centre of the bounds, which all but hulls have at the origin. \[m\]
+    #[inline]
+    fn centre(&self) -> Vector3<f64> {
+        match self {
+            Self::Hull(hull) => 0.5 * (hull.min + hull.max),
+            _ => Vector3::zeros(),
+        }
+    }
+
+    /// How far the solid reaches from its centre along a unit vector, at most. \[m\]
+    #[inline]
+    fn extent(&self, n: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Ball { radius } => *radius,
+            Self::Capsule { half, radius } => half * n.z.abs() + radius,
+            Self::Cylinder { half, radius } => {
+                half * n.y.abs() + radius * (n.x * n.x + n.z * n.z).sqrt()
+            }
+            Self::Box { half } => half.dot(&n.abs()),
+            Self::Hull(hull) => 0.5 * (hull.max - hull.min).dot(&n.abs()),
+            Self::HalfSpace => f64::INFINITY,
+        }
+    }
+
+    /// Whether a plane across an axis of either solid, or across the line of their centres, proves
+    /// them `need` apart; `other` stands at `pose` in this solid's frame.
+    pub(crate) fn is_separated(&self, other: &Self, pose: &Frame, need: f64) -> bool {
+        let between = pose.apply(&other.centre()) - self.centre();
+        let gap = |n: &Vector3<f64>| {
+            between.dot(n).abs() - self.extent(n) - other.extent(&pose.rotation.tr_mul(n))
+        };
+        (0..3).any(|i| {
+            gap(&Vector3::ith(i, 1.0)) >= need || gap(&pose.rotation.column(i).into_owned()) >= need
+        }) || between.try_normalize(1e-9).is_some_and(|n| gap(&n) >= need)
     }
 
     /// Radius \[m\] of the sphere about the centre of the bounds that holds the solid.

@@ -19,18 +19,16 @@ pub(crate) struct SphereTree {
     pub(crate) spheres: Vec<Sphere>,
 }
 
-/// Leaves are about as wide as this fraction of the solid, within `LEAF`.
-const FINENESS: f64 = 1.0 / 12.0;
-/// Bounds of a leaf's width. [m]
-const LEAF: (f64, f64) = (0.016, 0.04);
+/// Largest width of a leaf: about what the distance grid can tell apart, and small enough that few
+/// scan points have to be looked at for each. [m]
+const LEAF: f64 = 0.05;
 
 impl SphereTree {
     /// Covers the solid (no half-space) standing at `pose`; centres come in the parent's frame.
     pub(crate) fn new(solid: &Solid, pose: &Frame) -> Self {
         let (min, max) = solid.bounds();
-        let leaf = ((max - min).norm() * FINENESS).clamp(LEAF.0, LEAF.1);
         let mut tree = Self::default();
-        tree.cover(solid, min, max, leaf, solid.bounding_radius());
+        tree.cover(solid, min, max, solid.bounding_radius());
         for sphere in &mut tree.spheres {
             sphere.centre = pose.apply(&sphere.centre);
         }
@@ -91,7 +89,7 @@ impl SphereTree {
     }
 
     /// Appends the subtree for the part of the solid within one box; nothing if that is empty.
-    fn cover(&mut self, solid: &Solid, min: Vector3<f64>, max: Vector3<f64>, leaf: f64, most: f64) {
+    fn cover(&mut self, solid: &Solid, min: Vector3<f64>, max: Vector3<f64>, most: f64) {
         let (centre, half) = (0.5 * (min + max), 0.5 * (max - min));
         let radius = half.norm();
         if solid.distance_bound(&centre) > radius {
@@ -100,12 +98,12 @@ impl SphereTree {
         let at = self.spheres.len();
         self.spheres.push(Sphere { centre, radius: radius.min(most) + 1e-9, skip: 0 });
         let axis = half.imax();
-        if 2.0 * half[axis] > leaf {
+        if 2.0 * half[axis] > LEAF {
             let (mut left_max, mut right_min) = (max, min);
             left_max[axis] = centre[axis];
             right_min[axis] = centre[axis];
-            self.cover(solid, min, left_max, leaf, f64::INFINITY);
-            self.cover(solid, right_min, max, leaf, f64::INFINITY);
+            self.cover(solid, min, left_max, f64::INFINITY);
+            self.cover(solid, right_min, max, f64::INFINITY);
         }
         // A box whose halves both turned out to be empty stays as a leaf: still a valid cover.
         self.spheres[at].skip = self.spheres.len() as u32;

@@ -46,7 +46,7 @@ pub(crate) struct Moving {
     pub(crate) shape: SharedShape,
     /// In the body frame.
     pub(crate) tree: SphereTree,
-    /// Indices into the fixed shapes.
+    /// Indices of the fixed shapes to check against.
     pub(crate) against: Vec<usize>,
     /// How scan points may touch it, if they may.
     pub(crate) touch: Option<Touch>,
