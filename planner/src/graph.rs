@@ -29,7 +29,7 @@ pub struct GraphConfig {
 
 impl Default for GraphConfig {
     fn default() -> Self {
-        Self { neighbours: 8, radius: 0.10, line_step: 0.006, edge_samples: 32 }
+        Self { neighbours: 8, radius: 0.10, line_step: 0.006, edge_samples: 100 }
     }
 }
 

@@ -424,24 +424,29 @@ impl Setting {
         Ok(Self { stance, arm, scan, patches, world })
     }
 
-    /// Points of patches that are reached; `None` where body or start posture collide, or
-    /// nothing is reached.
+    /// Points of reached patches, each weighed by the edges that lead on from its patch, up to
+    /// [`WELL_JOINED`]; `None` where body or start posture collide, or nothing is reached.
     fn score(&self, job: &Job) -> Option<usize> {
         start(job, &self.arm, &self.world).ok()?;
         if self.world.stance_hit().is_some() {
             return None;
         }
         let cell = Workcell { arm: &self.arm, tool: &job.tool, world: &self.world };
-        let reached = reach(cell, &self.patches, 24, &|| ());
-        let score = reached
-            .iter()
-            .zip(&self.patches)
-            .filter(|(r, _)| r.is_some())
-            .map(|(_, p)| p.points.len())
+        let reached = reach(cell, &self.patches, job.ik_samples, &|| ());
+        let surface = Surface::new(&self.scan);
+        let config = GraphConfig { edge_samples: 24, ..job.graph };
+        let graph =
+            graph::build(cell, &surface, &self.patches, &reached, &config, &|_| (), &|| ());
+        let score = (0..self.patches.len())
+            .filter(|&i| reached[i].is_some())
+            .map(|i| self.patches[i].points.len() * (1 + graph.incident[i].len().min(WELL_JOINED)))
             .sum();
         (score > 0).then_some(score)
     }
 }
+
+/// Edges from a patch from which on a stance gains nothing by more of them.
+const WELL_JOINED: usize = 4;
 
 /// The joint vector that the plan starts from.
 fn start(job: &Job, arm: &Arm, world: &World) -> Result<JointVector, PipelineError> {

@@ -66,13 +66,14 @@ impl Default for StanceSearch {
             lift: Some(("torso_lift_joint".into(), vec![0.02, 0.1, 0.2, 0.3])),
             held: Vec::new(),
             patches: 60,
-            finalists: 12,
+            finalists: 24,
         }
     }
 }
 
-/// A stance with the share of the patches' points that have some inverse kinematics solution
-/// inside the margined limits, collisions not yet looked at.
+/// A stance with the share of the patches' points that have inverse kinematics solutions inside
+/// the margined limits, collisions not yet looked at. A patch counts in full if it has solutions
+/// at [`ROBUST`] redundancy values: one alone hardly ever leads on to the next patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// The stance.
@@ -82,7 +83,9 @@ pub struct Candidate {
 }
 
 /// Redundancy values that a patch is tried with.
-const REDUNDANCIES: usize = 10;
+const REDUNDANCIES: usize = 12;
+/// How many of them must have a solution for a patch to count in full.
+const ROBUST: usize = 3;
 /// Space that the standing body keeps from the scan. [m]
 const BODY_SPACE: f64 = 0.03;
 
@@ -145,11 +148,10 @@ pub fn candidates(
             }
             let reached: usize = judged
                 .iter()
-                .filter(|patch| reaches(arm, tool, patch, &from_floor, &values))
-                .map(|patch| patch.points.len())
+                .map(|patch| patch.points.len() * solved(arm, tool, patch, &from_floor, &values))
                 .sum();
-            (reached > 0)
-                .then(|| Candidate { stance: stance.clone(), share: reached as f64 / total as f64 })
+            let share = reached as f64 / (ROBUST * total) as f64;
+            (reached > 0).then(|| Candidate { stance: stance.clone(), share })
         })
         .collect();
     // The sort is stable and the candidates stand in a fixed order: ties are deterministic.
@@ -158,25 +160,30 @@ pub fn candidates(
     Ok(found)
 }
 
-/// Whether some heading and redundancy value has a solution inside the margined limits.
-fn reaches(
+/// At how many redundancy values the patch has a solution inside the margined limits, at the
+/// better of two headings, counted up to [`ROBUST`].
+fn solved(
     arm: &Arm,
     tool: &Tool,
     patch: &Patch,
     from_floor: &Isometry3<f64>,
     values: &[f64],
-) -> bool {
+) -> usize {
     let mut solutions = Solutions::new();
-    [0.0, std::f64::consts::FRAC_PI_2].iter().any(|&heading| {
+    let at = |heading: f64| {
         let travel = direction(&patch.normal, heading);
         let contact = contact_pose(&patch.centre, &patch.normal, &travel, tool.stand_off);
         let tip = from_floor * contact * tool.contact_in_tip().inverse();
-        values.iter().any(|&value| {
-            solutions.clear();
-            arm.ik().solve(&tip, value, &mut solutions);
-            solutions.iter().any(|s| arm.within_margins(&s.q))
-        })
-    })
+        values
+            .iter()
+            .filter(|&&value| {
+                arm.ik().solve(&tip, value, &mut solutions);
+                solutions.iter().any(|s| arm.within_margins(&s.q))
+            })
+            .take(ROBUST)
+            .count()
+    };
+    [0.0, std::f64::consts::FRAC_PI_2].map(at).into_iter().max().unwrap_or(0)
 }
 
 /// At most `count` patches, evenly picked.
