@@ -48,8 +48,8 @@ impl ArmArgs {
             }
         };
         let mut held: Vec<(&str, f64)> = Vec::new();
-        held.extend(self.torso.map(|height| ("torso_lift_joint", height)));
         held.extend(self.held.iter().map(|(name, position)| (name.as_str(), *position)));
+        held.extend(self.torso.map(|height| ("torso_lift_joint", height)));
         Ok(robot.arm(&spec)?.with_held(&held)?)
     }
 }

@@ -1,5 +1,6 @@
 //! The rehearsal stage of Nullsweep: everything that a plan meets before it meets a robot.
 //!
+//! * [`demo`]: the whole job, from a scan to a swept seat, with a swap of plans mid-motion.
 //! * [`mock`]: a simulated arm as a process, made of an [`endpoint`] (setpoints and a time in,
 //!   states out), a [`plant`] (a joint [`servo`], or the PR2's [`mechanism`]), the [`judge`] of
 //!   every setpoint, and [`fault`]s on request.
@@ -11,12 +12,14 @@
 
 pub mod arm_args;
 pub mod clock;
+pub mod demo;
 pub mod endpoint;
 pub mod fault;
 pub mod judge;
 pub mod kills;
 pub mod latency;
 pub mod loopback;
+pub mod measured;
 pub mod mechanism;
 pub mod mock;
 pub mod parts;

@@ -9,12 +9,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Parser;
 use comfy_table::{Table, presets};
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::service;
+use nullsweep_planner::plan::Plan;
+use nullsweep_robot::{Arm, JointVector};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
@@ -23,6 +25,7 @@ use crate::clock::Grid;
 use crate::endpoint::{Behaviour, Deeds, Endpoint, Fidelity};
 use crate::fault::FaultAt;
 use crate::judge::{Rules, Verdict};
+use crate::measured::{Swept, swept};
 use crate::record::Recorder;
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -36,6 +39,10 @@ const PERIOD_NS: u64 = 1_000_000;
 struct Args {
     #[command(flatten)]
     arm: ArmArgs,
+    /// Stand where this plan begins (unless told otherwise), and measure what is swept of its
+    /// surface
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
     /// Where the joints stand at first, base to tip; without it, the arm's home, in rad
     #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "Q1,Q2,…")]
     initial: Vec<f64>,
@@ -80,6 +87,8 @@ pub struct Outcome {
     pub endpoint: Deeds,
     /// Cycles of the mock's own loop that began more than one period late.
     pub own_late_cycles: u64,
+    /// What the measured positions have swept, where a plan was given.
+    pub swept: Option<Swept>,
 }
 
 /// Runs the mock with the arguments of a command line, program name first.
@@ -99,8 +108,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let arm = args.arm.load()?;
-    let initial = initial_posture(&arm, &args.initial)?;
+    let plan = match &args.plan {
+        Some(path) => Some(Plan::read(path).context("--plan")?),
+        None => None,
+    };
+    let (arm, initial) = scene(args, plan.as_ref())?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGTERM, SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
@@ -157,6 +169,7 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
         verdict: endpoint.judge().verdict().clone(),
         endpoint: endpoint.deeds(),
         own_late_cycles,
+        swept: plan.as_ref().map(|plan| swept(plan, &arm, recorder.postures())),
     };
     if let Some(path) = &args.record {
         let file = File::create(path)
@@ -167,6 +180,28 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     report(args, &outcome)?;
     Ok(outcome)
+}
+
+/// The arm with its held joints, and where it stands at first.
+fn scene(args: &Args, plan: Option<&Plan>) -> anyhow::Result<(Arm, JointVector)> {
+    let Some(plan) = plan else {
+        let arm = args.arm.load()?;
+        let initial = initial_posture(&arm, &args.initial)?;
+        return Ok((arm, initial));
+    };
+    let mut options = args.arm.clone();
+    // What is given on the command line comes later and so wins.
+    let planned = plan.held.iter().map(|h| (h.name.clone(), h.position));
+    options.held = planned.chain(args.arm.held.iter().cloned()).collect();
+    let arm = options.load()?;
+    if arm.fingerprint() != plan.fingerprint {
+        bail!("the plan was made for another arm than `{}` of this robot", args.arm.arm);
+    }
+    let first = plan.knots.first().context("the plan has no knots")?.q;
+    let first = &first[..arm.dof()];
+    let initial =
+        initial_posture(&arm, if args.initial.is_empty() { first } else { &args.initial })?;
+    Ok((arm, initial))
 }
 
 fn report(args: &Args, outcome: &Outcome) -> anyhow::Result<()> {
@@ -212,6 +247,10 @@ fn table(outcome: &Outcome) -> String {
     row("own late cycles", outcome.own_late_cycles.to_string());
     row("stopped by itself", format!("{} times", outcome.endpoint.timeouts));
     row("refused setpoints", outcome.endpoint.refused.to_string());
+    if let Some(swept) = &outcome.swept {
+        row("swept of reachable points", format!("{:.2} %", 100.0 * swept.reachable));
+        row("swept of all points", format!("{:.2} %", 100.0 * swept.all));
+    }
     for run in verdict.plans.iter().filter(|run| run.plan != "0/0") {
         row(
             &format!("plan {}", run.plan),

@@ -57,10 +57,9 @@ impl Recorder {
         });
     }
 
-    /// All measurements so far, oldest first.
-    #[must_use]
-    pub fn samples(&self) -> &[Sample] {
-        &self.samples
+    /// The measured positions so far, oldest first.
+    pub fn postures(&self) -> impl Iterator<Item = JointVector> + '_ {
+        self.samples.iter().map(|s| s.positions)
     }
 
     /// Writes time since the first measurement \[s\], plan, knot, measured and commanded joints.

@@ -8,6 +8,5 @@ use std::process::ExitCode;
 static ALLOCATOR: nullsweep_executor::PoolAllocator = nullsweep_executor::PoolAllocator::new();
 
 fn main() -> ExitCode {
-    let args: Vec<_> = std::env::args_os().collect();
-    nullsweep_tests::parts::play(&args).unwrap_or(ExitCode::SUCCESS)
+    nullsweep_tests::demo::main(std::env::args_os())
 }

@@ -19,11 +19,11 @@ const PERIOD_NS: u64 = 1_000_000;
 /// the executor's own priority. A stall counts for every deadline that it passes, each with its
 /// own lateness.
 #[must_use]
-pub(super) fn sleep_loop(time: Duration, priority: u8) -> Times {
+pub(super) fn sleep_loop(time: Duration, priority: u8, cpu: Option<usize>) -> Times {
     thread::scope(|scope| {
         let loop_ = scope.spawn(|| {
             // What is denied here is denied to the executor too, which says so.
-            let _ = become_real_time(priority, None);
+            let _ = become_real_time(priority, cpu);
             bare_loop(time)
         });
         loop_.join().unwrap_or_default()
@@ -47,7 +47,12 @@ fn bare_loop(time: Duration) -> Times {
 
 /// One way from a thread that sends a setpoint each millisecond to one that polls for it, with
 /// nothing else done.
-pub(super) fn ping(root: &Path, time: Duration, priority: u8) -> anyhow::Result<Times> {
+pub(super) fn ping(
+    root: &Path,
+    time: Duration,
+    priority: u8,
+    cpu: Option<usize>,
+) -> anyhow::Result<Times> {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
         let receiving = scope.spawn(|| -> anyhow::Result<Times> {
@@ -62,7 +67,7 @@ pub(super) fn ping(root: &Path, time: Duration, priority: u8) -> anyhow::Result<
             Ok(times)
         });
         let sending = scope.spawn(|| {
-            let _ = become_real_time(priority, None);
+            let _ = become_real_time(priority, cpu);
             send(root, time)
         });
         let sent = sending.join();
@@ -93,10 +98,11 @@ mod tests {
 
     #[test]
     fn the_yardsticks_measure_something() {
-        let times = sleep_loop(Duration::from_millis(50), 0).percentiles();
+        let times = sleep_loop(Duration::from_millis(50), 0, None).percentiles();
         assert!(times.count >= 50 && times.max_ns > 0, "{times:?}");
         let folder = tempfile::TempDir::new().expect("a folder");
-        let times = ping(folder.path(), Duration::from_millis(100), 0).expect("both ends open");
+        let times =
+            ping(folder.path(), Duration::from_millis(100), 0, None).expect("both ends open");
         assert!(times.percentiles().count > 0);
     }
 }

@@ -2,6 +2,8 @@
 //! a new plan to its first setpoint, beside what the machine does without it, in the same run.
 
 mod baseline;
+mod cyclictest;
+mod picture;
 mod station;
 mod stats;
 
@@ -63,6 +65,12 @@ struct Args {
     /// Write every figure as JSON, to a file or to standard output with -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    /// Pin executor, bare loop and cyclictest to this processor
+    #[arg(long, value_name = "N")]
+    cpu: Option<usize>,
+    /// Write the distributions as a picture, a page that needs no network
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// Options for the executor, after `--`
     #[arg(last = true)]
     executor: Vec<OsString>,
@@ -109,6 +117,7 @@ pub struct Figures {
 #[derive(Default)]
 struct Sums {
     sleep: Times,
+    cyclictest: Option<Times>,
     ping: Times,
     wake: [u32; HISTOGRAM_BUCKETS],
     compute: [u32; HISTOGRAM_BUCKETS],
@@ -151,12 +160,20 @@ fn run(args: &Args) -> anyhow::Result<Figures> {
     for round in 1..=args.rounds {
         eprintln!("latency: round {round} of {}: yardsticks", args.rounds);
         let stage = Stage::new(std::env::current_exe()?, "pr2")?;
-        sums.sleep.merge(&baseline::sleep_loop(share / 2, args.priority));
-        sums.ping.merge(&baseline::ping(&stage.root(), share / 2, args.priority)?);
+        let third = share / 3;
+        sums.sleep.merge(&baseline::sleep_loop(third, args.priority, args.cpu));
+        if let Some(times) = cyclictest::run(third, args.priority, args.cpu)? {
+            sums.cyclictest.get_or_insert_default().merge(&times);
+        }
+        sums.ping.merge(&baseline::ping(&stage.root(), third, args.priority, args.cpu)?);
         eprintln!("latency: round {round} of {}: executor", args.rounds);
         measure(args, &arm, &stage, share, &mut random, &mut sums)?;
     }
     let figures = figures(args, load, &sums);
+    if let Some(path) = &args.report {
+        fs::write(path, page(&figures, &sums))
+            .with_context(|| format!("cannot write the picture to {}", path.display()))?;
+    }
     report(args, &figures)?;
     Ok(figures)
 }
@@ -173,6 +190,9 @@ fn measure(
     let mut options: Vec<OsString> = vec!["run".into()];
     options.extend(stage.place());
     options.extend(["--priority".into(), args.priority.to_string().into()]);
+    if let Some(cpu) = args.cpu {
+        options.extend(["--cpu".into(), cpu.to_string().into()]);
+    }
     options.extend(args.executor.iter().cloned());
     let mut executor = stage.start(Part::Executor, "executor", options)?;
     let (root, done) = (stage.root(), AtomicBool::new(false));
@@ -262,20 +282,40 @@ fn figures(args: &Args, load: String, sums: &Sums) -> Figures {
         seconds: args.seconds,
         seed: args.seed,
         knots: args.knots,
-        rows: vec![
-            row("bare sleep loop: wake-up lateness", &sums.sleep),
-            Row { what: "executor: wake-up lateness", times: of_buckets(&sums.wake) },
-            Row { what: "executor: compute time", times: of_buckets(&sums.compute) },
-            row("executor: setpoint made after due", &sums.made_late),
-            row("bare iceoryx2 ping: one way", &sums.ping),
-            row("setpoint: executor to endpoint", &sums.transport),
-            row("setpoint: inter-arrival", &sums.inter_arrival),
-            row("publish to first new setpoint", &sums.swap),
-        ],
+        rows: sums
+            .cyclictest
+            .iter()
+            .map(|times| row("cyclictest: wake-up lateness", times))
+            .chain([
+                row("bare sleep loop: wake-up lateness", &sums.sleep),
+                Row { what: "executor: wake-up lateness", times: of_buckets(&sums.wake) },
+                Row { what: "executor: compute time", times: of_buckets(&sums.compute) },
+                row("executor: setpoint made after due", &sums.made_late),
+                row("bare iceoryx2 ping: one way", &sums.ping),
+                row("setpoint: executor to endpoint", &sums.transport),
+                row("setpoint: inter-arrival", &sums.inter_arrival),
+                row("publish to first new setpoint", &sums.swap),
+            ])
+            .collect(),
         missed_cycles: sums.missed,
         violations: sums.violations,
         plans: (sums.published, sums.accepted),
     }
+}
+
+fn page(figures: &Figures, sums: &Sums) -> String {
+    let mut curves = vec![
+        ("executor: wake-up lateness", picture::of_histogram(&sums.wake)),
+        ("executor: compute time", picture::of_histogram(&sums.compute)),
+        ("bare sleep loop: wake-up lateness", picture::of_times(&sums.sleep)),
+        ("setpoint: executor to endpoint", picture::of_times(&sums.transport)),
+        ("bare iceoryx2 ping: one way", picture::of_times(&sums.ping)),
+        ("publish to first new setpoint", picture::of_times(&sums.swap)),
+    ];
+    curves.extend(
+        sums.cyclictest.as_ref().map(|t| ("cyclictest: wake-up lateness", picture::of_times(t))),
+    );
+    picture::page(&format!("Latencies, kernel {}", figures.kernel), curves)
 }
 
 fn report(args: &Args, figures: &Figures) -> anyhow::Result<()> {

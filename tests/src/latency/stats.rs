@@ -43,6 +43,16 @@ impl Times {
         self.0.saturating_record(ns);
     }
 
+    /// Counts one value so many times.
+    pub fn record_n(&mut self, ns: u64, count: u64) {
+        self.0.saturating_record_n(ns, count);
+    }
+
+    /// Each value that was recorded, at this resolution, rising, and how often.
+    pub fn counts(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+        self.0.iter_recorded().map(|v| (v.value_iterated_to(), v.count_at_value()))
+    }
+
     /// Counts all samples of another distribution.
     pub fn merge(&mut self, other: &Self) {
         self.0.add(&other.0).expect("both have the same bounds");

@@ -1,0 +1,440 @@
+//! `demo`: the whole job on one stage. It plans how to sweep a chair's seat, starts a mock arm and
+//! an executor, publishes the plan, and swaps in a second one while the arm moves.
+
+mod table;
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use clap::Parser;
+use nullsweep_ipc_types::ports::Ipc;
+use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
+use nullsweep_planner::plan::Plan;
+use serde::{Deserialize, Serialize};
+
+use crate::latency::{Percentiles, of_buckets};
+use crate::measured::Swept;
+use crate::parts;
+use crate::stage::{Part, Process, Stage};
+use crate::witness::{PATIENCE, Witness};
+
+/// How long a plan may take to make.
+const PLANNING: Duration = Duration::from_secs(120);
+/// Where in the first plan the second one takes over, as a share of its time.
+const SWAP_AT: f64 = 0.35;
+/// How much less than planned the measured coverage may be: the arm follows with an error of a
+/// few millimetres.
+const COVERAGE_SLACK: f64 = 0.02;
+
+/// A desktop without real-time rights stalls a process now and then for longer than a robot would.
+const PATIENT: [&str; 4] = ["--stale-ms", "100", "--lost-ms", "400"];
+
+/// Plans a chair's seat, sweeps it with a mock PR2, and swaps in a second plan mid-motion.
+///
+/// Ends with 0 only if both plans passed their check, the swap took place, the endpoint saw no
+/// violation, and what was measured covers what was planned.
+#[derive(Debug, Parser)]
+#[command(name = "demo", version)]
+struct Args {
+    /// Where the report of the first plan is written
+    #[arg(long, default_value = "demo.nullsweep-report.html", value_name = "FILE")]
+    report: PathBuf,
+    /// Write every figure as JSON, to a file or to standard output with -
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<PathBuf>,
+    /// Copy the plans and the processes' output to this folder
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    /// Seed of both plans
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Samples of the inverse kinematics at each tool pose
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    ik_samples: u32,
+}
+
+/// The figures of one plan that the table shows; the planner writes more.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct PlanFigures {
+    /// Scanned points.
+    pub points: usize,
+    /// Patches.
+    pub patches: usize,
+    /// Patches that the arm reaches.
+    pub reachable: usize,
+    /// Sum of all joint displacements. \[rad\]
+    pub effort_rad: f64,
+    /// \[s\]
+    pub task_time_s: f64,
+    /// Seconds that planning took.
+    pub calc_time_total_s: f64,
+    /// Knots.
+    pub knots: usize,
+    /// Motions through free space.
+    pub jumps: usize,
+    /// Share of all scanned points, with what was swept before.
+    pub coverage_all: f64,
+    /// Share of the points of reachable patches, with what was swept before.
+    pub coverage_reachable: f64,
+    /// \[m\]
+    pub line_deviation_max_m: f64,
+}
+
+/// A plan as it was asked for and came out.
+#[derive(Clone, Debug, Serialize)]
+pub struct Planned {
+    /// How the order was found.
+    pub method: &'static str,
+    /// What was minimised.
+    pub cost: &'static str,
+    /// Its figures.
+    pub figures: PlanFigures,
+}
+
+/// Where and how the second plan took over.
+#[derive(Clone, Debug, Serialize)]
+pub struct Swap {
+    /// The first plan's knot.
+    pub knot: usize,
+    /// Its time in the first plan. \[s\]
+    pub at_s: f64,
+    /// The first plan's knot when the second one was accepted.
+    pub accepted_at_knot: u32,
+    /// The largest step of a joint in the cycle of the swap, as a share of v·T.
+    pub step_ratio: f64,
+    /// The largest change of a joint's velocity there. \[rad/s\]
+    pub velocity_step: f64,
+}
+
+/// What is asked of a run, and whether it came true.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    /// What.
+    pub what: &'static str,
+    /// Whether.
+    pub ok: bool,
+    /// The figures behind it.
+    pub found: String,
+}
+
+/// Everything that the demo tells.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// Both plans.
+    pub plans: [Planned; 2],
+    /// The swap.
+    pub swap: Swap,
+    /// Setpoints that the endpoint judged.
+    pub setpoints: u64,
+    /// Violations among them.
+    pub violations: u64,
+    /// What the measured positions have swept.
+    pub measured: Swept,
+    /// Wake-up lateness of the executor.
+    pub lateness: Percentiles,
+    /// Deadlines that it missed.
+    pub missed_cycles: u64,
+    /// The report's path.
+    pub report: PathBuf,
+    /// How long all of it took. \[s\]
+    pub seconds: f64,
+    /// What must be so.
+    pub checks: Vec<Check>,
+}
+
+/// What is read from the mock's verdict.
+#[derive(Debug, Deserialize)]
+struct MockOutcome {
+    violations: u64,
+    verdict: MockVerdict,
+    swept: Option<Swept>,
+}
+
+#[derive(Debug, Deserialize)]
+struct MockVerdict {
+    setpoints: u64,
+    plans: Vec<MockRun>,
+}
+
+#[derive(Debug, Deserialize)]
+struct MockRun {
+    plan: String,
+    join_step_ratio: f64,
+    join_velocity_step: f64,
+}
+
+/// Runs with the arguments of a command line, program name first; with a hidden first argument
+/// the program plays another part, see [`parts`].
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let args: Vec<_> = args.into_iter().collect();
+    if let Some(code) = parts::play(&args) {
+        return code;
+    }
+    let args = match Args::try_parse_from(args) {
+        Ok(args) => args,
+        Err(error) => error.exit(),
+    };
+    match run(&args) {
+        Ok(outcome) if outcome.checks.iter().all(|c| c.ok) => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("demo: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let stage = Stage::new(std::env::current_exe()?, "pr2")?;
+    let outcome = perform(args, &stage);
+    if let Some(folder) = &args.keep {
+        stage.copy_files(folder).with_context(|| format!("cannot fill {}", folder.display()))?;
+    }
+    let outcome = outcome?;
+    match &args.json {
+        Some(path) if path.as_os_str() == "-" => {
+            println!("{}", serde_json::to_string_pretty(&outcome)?);
+        }
+        Some(path) => {
+            let file = File::create(path)
+                .with_context(|| format!("cannot write the figures to {}", path.display()))?;
+            serde_json::to_writer_pretty(file, &outcome)?;
+            println!("{}", table::text(&outcome));
+        }
+        None => println!("{}", table::text(&outcome)),
+    }
+    Ok(outcome)
+}
+
+fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
+    let start = Instant::now();
+    let say = |text: &str| eprintln!("{:6.1} s  {text}", start.elapsed().as_secs_f64());
+
+    say("planning the chair's seat: Curvature-GTSP, least task time");
+    let report = std::path::absolute(&args.report)?;
+    let more = [OsString::from("--report"), report.clone().into()];
+    let first = plan(args, stage, "first", ["curvature", "time"], &more)?;
+    let path = stage.file("first.json");
+    let knot = swap_knot(&Plan::read(&path)?);
+    let at_s = knot_time(&Plan::read(&path)?, knot);
+
+    say(&format!("planning another one from its knot {knot} ({at_s:.1} s): TSP, least effort"));
+    let mut from = path.clone().into_os_string();
+    from.push(format!("@{knot}"));
+    let second = plan(args, stage, "second", ["tsp", "effort"], &["--continue".into(), from])?;
+
+    say("starting mock hardware and executor");
+    let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
+    let mut witness = Witness::open(&ipc)?;
+    let mut mock = start_mock(stage, &path)?;
+    let mut executor = start_executor(stage)?;
+    alive(witness.mode(Mode::Hold), &mut [&mut mock, &mut executor])?;
+
+    say(&format!("sweeping: {:.1} s in the first plan", first.figures.task_time_s));
+    publish(stage, "first", Duration::from_secs(60), &[])?;
+    let (old, _) = started(&mut witness, &[], &mut [&mut mock, &mut executor])?;
+    // Mid-motion: the arm is on the surface or on its way there, and the knot is still ahead.
+    let early = 0.3 * at_s * 1e9;
+    alive(
+        witness.see("motion", |t| t.plan == old && t.plan_time_ns as f64 > early),
+        &mut [&mut mock, &mut executor],
+    )?;
+    say("publishing the second plan while the arm moves");
+    let mut publisher = start_publish(stage, "second", &["--wait"])?;
+    let (new, accepted) = accepted(&mut witness, old, &mut [&mut mock, &mut executor])?;
+    let patience = Duration::from_secs_f64(60.0 + 3.0 * second.figures.task_time_s);
+    finish(&mut publisher, patience)?;
+    alive(witness.mode(Mode::Hold), &mut [&mut mock, &mut executor])?;
+    let telemetry = witness.see("a last snapshot", |_| true)?;
+
+    say("done; asking the mock for its verdict");
+    executor.terminate(PATIENCE)?;
+    mock.terminate(PATIENCE)?;
+    let text = fs::read(stage.file("mock.json"))
+        .with_context(|| format!("no verdict of the mock: {}", tail(&mock.stderr())))?;
+    let found: MockOutcome = serde_json::from_slice(&text)?;
+    let events = witness.events();
+    let ended = |plan: PlanId, kind: EventKind| {
+        events.iter().any(|e| e.plan == plan && e.kind == kind.wire())
+    };
+    let swapped = ended(old, EventKind::Superseded) && ended(new, EventKind::Finished);
+    let join = found.verdict.plans.iter().find(|run| run.plan == new.to_string());
+    let swap = Swap {
+        knot,
+        at_s,
+        accepted_at_knot: accepted.knot,
+        step_ratio: join.map_or(f64::NAN, |j| j.join_step_ratio),
+        velocity_step: join.map_or(f64::NAN, |j| j.join_velocity_step),
+    };
+    let measured = found.swept.context("the mock did not measure what was swept")?;
+    let planned = second.figures.coverage_reachable;
+    let checks = vec![
+        Check {
+            what: "the second plan took over mid-motion and ran to its end",
+            ok: swapped && (accepted.knot as usize) < knot && join.is_some(),
+            found: format!("accepted in knot {}, joined in knot {knot}", accepted.knot),
+        },
+        Check {
+            what: "the endpoint saw no violation",
+            ok: found.violations == 0 && found.verdict.setpoints > 0,
+            found: format!("{} of {}", found.violations, found.verdict.setpoints),
+        },
+        Check {
+            what: "what was measured covers what was planned",
+            ok: measured.reachable >= planned - COVERAGE_SLACK,
+            found: format!("{:.1} % for {:.1} %", 100.0 * measured.reachable, 100.0 * planned),
+        },
+        Check {
+            what: "the report is there",
+            ok: fs::metadata(&report).is_ok_and(|m| m.len() > 0),
+            found: report.display().to_string(),
+        },
+    ];
+    Ok(Outcome {
+        plans: [first, second],
+        swap,
+        setpoints: found.verdict.setpoints,
+        violations: found.violations,
+        measured,
+        lateness: of_buckets(&telemetry.lateness),
+        missed_cycles: telemetry.missed_cycles,
+        report,
+        seconds: start.elapsed().as_secs_f64(),
+        checks,
+    })
+}
+
+/// Makes a plan in a process of its own and reads its figures.
+fn plan(
+    args: &Args,
+    stage: &Stage,
+    name: &str,
+    [method, cost]: [&'static str; 2],
+    more: &[OsString],
+) -> anyhow::Result<Planned> {
+    let figures = stage.file(&format!("{name}-figures.json"));
+    let mut options: Vec<OsString> = ["plan", "--demo", "chair-seat"].map(Into::into).to_vec();
+    options.extend(["--method", method, "--cost", cost].map(Into::into));
+    options.extend(["--seed".into(), args.seed.to_string().into()]);
+    options.extend(["--ik-samples".into(), args.ik_samples.to_string().into()]);
+    options.extend(["--out".into(), stage.file(&format!("{name}.json")).into()]);
+    options.extend(["--json".into(), figures.clone().into()]);
+    options.extend(more.iter().cloned());
+    let mut planner = stage.start(Part::Planner, &format!("planner-{name}"), options)?;
+    finish(&mut planner, PLANNING)?;
+    let text = fs::read(&figures).with_context(|| format!("no {}", figures.display()))?;
+    let figures = serde_json::from_slice(&text).context("the planner's figures")?;
+    Ok(Planned { method, cost, figures })
+}
+
+/// The knot at about [`SWAP_AT`] of the plan's time.
+fn swap_knot(plan: &Plan) -> usize {
+    let due = SWAP_AT * plan.duration();
+    (0..plan.knots.len()).find(|&k| knot_time(plan, k) >= due).unwrap_or(0)
+}
+
+fn knot_time(plan: &Plan, knot: usize) -> f64 {
+    plan.knots[knot].time_ns as f64 * 1e-9
+}
+
+fn start_mock(stage: &Stage, plan: &Path) -> anyhow::Result<Process> {
+    let mut options = stage.place().to_vec();
+    options.extend(["--plan".into(), plan.into()]);
+    options.extend(["--json".into(), stage.file("mock.json").into()]);
+    options.extend(["--record".into(), stage.file("record.csv").into()]);
+    options.extend(["--timeout".into(), "100".into()]);
+    Ok(stage.start(Part::Mock, "mock", options)?)
+}
+
+fn start_executor(stage: &Stage) -> anyhow::Result<Process> {
+    let mut options: Vec<OsString> = vec!["run".into()];
+    options.extend(stage.place());
+    options.extend(PATIENT.map(Into::into));
+    Ok(stage.start(Part::Executor, "executor", options)?)
+}
+
+fn start_publish(stage: &Stage, name: &str, more: &[&str]) -> anyhow::Result<Process> {
+    let mut options: Vec<OsString> = vec!["publish".into()];
+    options.push(stage.file(&format!("{name}.json")).into());
+    options.extend(stage.place());
+    options.extend(more.iter().map(OsString::from));
+    Ok(stage.start(Part::Planner, &format!("publish-{name}"), options)?)
+}
+
+fn publish(stage: &Stage, name: &str, patience: Duration, more: &[&str]) -> anyhow::Result<()> {
+    finish(&mut start_publish(stage, name, more)?, patience)
+}
+
+/// Waits for a process that must end well.
+fn finish(process: &mut Process, patience: Duration) -> anyhow::Result<()> {
+    match process.wait(patience)? {
+        Some(status) if status.success() => Ok(()),
+        Some(status) => {
+            bail!("{} failed ({status}): {}", process.name(), tail(&process.stderr()))
+        }
+        None => bail!("{} did not end within {} s", process.name(), patience.as_secs()),
+    }
+}
+
+/// The first plan that was started and is none of `known`, and its telemetry.
+fn started(
+    witness: &mut Witness,
+    known: &[PlanId],
+    others: &mut [&mut Process],
+) -> anyhow::Result<(PlanId, Telemetry)> {
+    let moving = |t: &Telemetry| t.plan.is_some() && !known.contains(&t.plan);
+    let telemetry = alive(witness.see("a plan in motion", moving), others)?;
+    Ok((telemetry.plan, telemetry))
+}
+
+/// The plan that was accepted after `old`, and the telemetry of that moment.
+fn accepted(
+    witness: &mut Witness,
+    old: PlanId,
+    others: &mut [&mut Process],
+) -> anyhow::Result<(PlanId, Telemetry)> {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        witness.look()?;
+        let answer = |kind: u32| {
+            [EventKind::Accepted, EventKind::Rejected].map(EventKind::wire).contains(&kind)
+        };
+        if let Some(event) = witness.events().iter().find(|e| e.plan != old && answer(e.kind)) {
+            let telemetry = *witness.telemetry().context("no telemetry came")?;
+            return Ok((event.plan, telemetry));
+        }
+        if Instant::now() > end {
+            alive(
+                Err::<(), _>(anyhow::anyhow!("the second plan got no answer: {witness}")),
+                others,
+            )?;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// The result, or why it could not be had: a process that ended says more than what it left undone.
+fn alive<T, E: Into<anyhow::Error>>(
+    result: Result<T, E>,
+    processes: &mut [&mut Process],
+) -> anyhow::Result<T> {
+    result.map_err(|error| {
+        for process in processes {
+            if let Ok(Some(status)) = process.status() {
+                let (name, said) = (process.name().to_owned(), tail(&process.stderr()));
+                return anyhow::anyhow!("{name} ended ({status}): {said}");
+            }
+        }
+        error.into()
+    })
+}
+
+/// The last lines of what a process said.
+fn tail(text: &str) -> String {
+    let lines: Vec<_> = text.trim_end().lines().collect();
+    lines[lines.len().saturating_sub(8)..].join("\n  ")
+}
