@@ -50,6 +50,7 @@ enum Victim {
 /// The running system.
 struct Lab<'a> {
     stage: &'a Stage,
+    ipc: Ipc,
     witness: Witness,
     mock: Process,
     executor: Process,
@@ -128,8 +129,8 @@ impl<'a> Lab<'a> {
         let mut witness = Witness::open(&ipc)?;
         let mock = start_mock(stage, 0, &[])?;
         let executor = start_executor(stage, 0)?;
-        witness.mode(Mode::Hold)?;
-        Ok(Self { stage, witness, mock, executor, starts: 1, violations: 0, timeouts: 0 })
+        witness.ready(&ipc)?;
+        Ok(Self { stage, ipc, witness, mock, executor, starts: 1, violations: 0, timeouts: 0 })
     }
 
     /// One motion from where the arm is, one kill in it, and everything whole again.
@@ -149,7 +150,7 @@ impl<'a> Lab<'a> {
                 self.executor.kill()?;
                 self.starts += 1;
                 self.executor = start_executor(self.stage, self.starts)?;
-                let held = self.witness.mode(Mode::Hold)?;
+                let held = self.witness.ready(&self.ipc)?;
                 ensure!(held.plan == PlanId::NONE, "a plan of before the restart was started");
             }
             Victim::Mock => {

@@ -106,6 +106,15 @@ impl Witness {
         self.see(mode.text(), |t| t.mode == mode.wire())
     }
 
+    /// Waits until the executor holds the arm and listens for plans; those are two of its threads.
+    pub fn ready(&mut self, ipc: &Ipc) -> Result<Telemetry, WitnessError> {
+        let held = self.mode(Mode::Hold)?;
+        let publisher = ipc.plan_publisher(1)?;
+        self.until("an executor that takes plans".into(), |_| {
+            publisher.has_executor().then_some(held)
+        })
+    }
+
     /// Waits until telemetry that is newer than this call fits.
     pub fn see(
         &mut self,

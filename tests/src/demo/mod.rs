@@ -232,7 +232,7 @@ fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     let mut witness = Witness::open(&ipc)?;
     let mut mock = start_mock(stage, &path)?;
     let mut executor = start_executor(stage)?;
-    alive(witness.mode(Mode::Hold), &mut [&mut mock, &mut executor])?;
+    alive(witness.ready(&ipc), &mut [&mut mock, &mut executor])?;
 
     say(&format!("sweeping: {:.1} s in the first plan", first.figures.task_time_s));
     publish(stage, "first", Duration::from_secs(60), &[])?;

@@ -20,7 +20,7 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use comfy_table::{CellAlignment, Table, presets};
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
-use nullsweep_ipc_types::{EventKind, HISTOGRAM_BUCKETS, Mode, PlanId};
+use nullsweep_ipc_types::{EventKind, HISTOGRAM_BUCKETS, PlanId};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, MAX_DOF, Robot, Side};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -233,7 +233,7 @@ fn publish(
 ) -> anyhow::Result<Vec<PlanId>> {
     let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
     let mut witness = Witness::open(&ipc)?;
-    let held = witness.mode(Mode::Hold)?;
+    let held = witness.ready(&ipc)?;
     let mut from = JointVector::default();
     from.copy_from_slice(&held.commanded[..MAX_DOF]);
     let sketch = Sketch::twitch(arm, &from, PLAN_ANGLE, args.knots, PLAN_SECONDS);

@@ -4,6 +4,7 @@
 mod common;
 mod kill;
 mod mock;
+mod publish;
 mod reject;
 mod rig;
 mod run;

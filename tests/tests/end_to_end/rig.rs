@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 
 use nullsweep_ipc_types::ports::{Ipc, PlanPublisher};
-use nullsweep_ipc_types::{EventKind, MAX_KNOTS, Mode, PlanEvent, PlanId, Reason};
+use nullsweep_ipc_types::{EventKind, MAX_KNOTS, PlanEvent, PlanId, Reason};
 use nullsweep_robot::Arm;
 use nullsweep_tests::sketch::Sketch;
 use nullsweep_tests::stage::{Part, Process, Stage};
@@ -23,11 +23,12 @@ pub(crate) struct Rig {
     pub(crate) stage: Stage,
 }
 
-pub(crate) fn start_mock(stage: &Stage) -> Process {
+pub(crate) fn start_mock(stage: &Stage, more: &[&str]) -> Process {
     let mut args = stage.place().to_vec();
     // A loaded machine may stall a process for longer than a robot would bear.
     args.extend(["--timeout", "500", "--json"].map(OsString::from));
     args.push(stage.file("mock.json").into());
+    args.extend(more.iter().map(OsString::from));
     stage.start(Part::Mock, "mock", args).expect("the mock starts")
 }
 
@@ -49,10 +50,10 @@ impl Rig {
         let arm = right_arm();
         let ipc = Ipc::open(stage.robot(), Some(&stage.root())).expect("the test's own ports");
         let mut witness = Witness::open(&ipc).expect("the test can listen");
-        let mock = start_mock(&stage);
+        let mock = start_mock(&stage, &[]);
         let executor = start_executor(&stage, "executor");
         let publisher = ipc.plan_publisher(MAX_KNOTS).expect("the test can publish");
-        if let Err(error) = witness.mode(Mode::Hold) {
+        if let Err(error) = witness.ready(&ipc) {
             panic!("{error}\nmock: {}\nexecutor: {}", mock.stderr(), executor.stderr());
         }
         Self { executor, mock, witness, publisher, arm, stage }

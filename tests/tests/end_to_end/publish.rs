@@ -1,0 +1,147 @@
+//! Plan files that `planner publish` sends, as a user does it by hand.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use nullsweep_ipc_types::EventKind;
+use nullsweep_ipc_types::ports::Ipc;
+use nullsweep_planner::cost::CostKind;
+use nullsweep_planner::formulation::Method;
+use nullsweep_planner::plan::{Continues, FORMAT, Held, Plan, PlanKnot, SurfaceSample};
+use nullsweep_planner::tool::Tool;
+use nullsweep_robot::{Arm, JointVector};
+use nullsweep_tests::sketch::{Sketch, swung};
+use nullsweep_tests::stage::{Part, Process, Stage};
+use nullsweep_tests::witness::{PATIENCE, Witness};
+
+use crate::common::{right_arm, stage, verdict};
+use crate::rig::{start_executor, start_mock};
+
+/// A plan file of a joint motion, with one point under the pad where it begins and one far away.
+fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
+    let tool = Tool::default();
+    let contact = arm.tip_pose(&sketch.posture(0)) * tool.contact_in_tip();
+    let sample = |along: f64, reachable| SurfaceSample {
+        point: (contact * nalgebra::Point3::new(along, 0.0, 0.0)).into(),
+        normal: (contact * -nalgebra::Vector3::z()).into(),
+        reachable,
+    };
+    let knot = |k: usize| PlanKnot {
+        time_ns: sketch.knots[k].time_from_start_ns,
+        q: sketch.posture(k),
+        line: None,
+        patch: None,
+    };
+    Plan {
+        format: FORMAT,
+        robot: "pr2".into(),
+        fingerprint: arm.fingerprint(),
+        joints: arm.joint_names().to_vec(),
+        held: arm
+            .held_joints()
+            .iter()
+            .map(|h| Held { name: h.name.clone(), position: h.position })
+            .collect(),
+        tool,
+        base: [0.0; 3],
+        method: Method::Tsp,
+        cost: CostKind::Time,
+        seed: 1,
+        knots: (0..sketch.knots.len()).map(knot).collect(),
+        patches: Vec::new(),
+        surface: vec![sample(0.0, true), sample(5.0, false)],
+        continues: None,
+    }
+}
+
+fn write(stage: &Stage, name: &str, plan: &Plan) -> PathBuf {
+    let path = stage.file(name);
+    plan.write(&path).expect("a plan file");
+    path
+}
+
+fn publish(stage: &Stage, plan: &PathBuf, more: &[&str]) -> Process {
+    let mut args: Vec<OsString> = vec!["publish".into(), plan.into()];
+    args.extend(stage.place());
+    args.extend(more.iter().map(OsString::from));
+    stage.start(Part::Planner, "publish", args).expect("the planner starts")
+}
+
+fn ended(mut process: Process) -> (Option<i32>, String) {
+    let status = process.wait(PATIENCE).expect("known").expect("it ends");
+    (status.code(), format!("{}{}", process.stdout(), process.stderr()))
+}
+
+/// Mock and executor, the mock standing where the plan begins.
+fn start(stage: &Stage, plan: &PathBuf) -> (Witness, Process, Process) {
+    let ipc = Ipc::open(stage.robot(), Some(&stage.root())).expect("the test's own ports");
+    let mut witness = Witness::open(&ipc).expect("the test can listen");
+    let path = plan.to_str().expect("UTF-8");
+    let mock = start_mock(stage, &["--plan", path]);
+    let executor = start_executor(stage, "executor");
+    if let Err(error) = witness.ready(&ipc) {
+        panic!("{error}\nmock: {}\nexecutor: {}", mock.stderr(), executor.stderr());
+    }
+    (witness, mock, executor)
+}
+
+#[test]
+fn a_plan_file_is_published_swept_and_continued() {
+    let stage = stage();
+    // The torso stands where the plan was made for, not where it rests.
+    let arm = right_arm().with_held(&[("torso_lift_joint", 0.25)]).expect("a torso");
+    let from = swung(&arm, &arm.home(), 0.1);
+    let sketch = Sketch::through(&arm, &[from, arm.home(), from, arm.home()], 0.05);
+    let first = plan(&arm, &sketch);
+    let path = write(&stage, "first.json", &first);
+    let (mut witness, mut mock, _executor) = start(&stage, &path);
+
+    let (code, said) = ended(publish(&stage, &path, &[]));
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("accepted"), "{said}");
+    let old = witness.see("motion", |t| t.plan.is_some()).expect("it moves");
+
+    let at = old.knot as usize + 30;
+    let goal: JointVector = swung(&arm, &arm.home(), 0.2);
+    let next = Sketch::through(&arm, &[sketch.posture(at), goal], 0.1);
+    let mut second = plan(&arm, &next);
+    second.continues = Some(Continues { digest: first.digest(), knot: at as u32 });
+    let (code, said) = ended(publish(&stage, &write(&stage, "second.json", &second), &["--wait"]));
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("finished"), "{said}");
+    let end = witness.end(old.plan).expect("an end");
+    assert_eq!(end.kind, EventKind::Superseded.wire());
+
+    let found = verdict(&stage, &mut mock);
+    assert_eq!(found["violations"], 0, "{found:#}");
+    assert_eq!(found["swept"]["points"], 2, "{found:#}");
+    assert_eq!(found["swept"]["reachable"], 1.0, "{found:#}");
+    assert_eq!(found["swept"]["all"], 0.5, "{found:#}");
+}
+
+#[test]
+fn a_plan_file_for_another_torso_height_is_rejected_with_its_reason() {
+    let stage = stage();
+    let arm = right_arm();
+    let sketch = Sketch::swings(&arm, &arm.home(), 1, 0.1, 0.1);
+    let path = write(&stage, "plan.json", &plan(&arm, &sketch));
+    let (_witness, mut mock, _executor) = start(&stage, &path);
+    let other = arm.with_held(&[("torso_lift_joint", 0.3)]).expect("a torso");
+    let other = write(&stage, "other.json", &plan(&other, &sketch));
+    let (code, said) = ended(publish(&stage, &other, &[]));
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("held joint"), "{said}");
+    let found = verdict(&stage, &mut mock);
+    assert_eq!(found["violations"], 0, "{found:#}");
+}
+
+#[test]
+fn a_plan_file_without_an_executor_says_so() {
+    let stage = stage();
+    let arm = right_arm();
+    let sketch = Sketch::swings(&arm, &arm.home(), 1, 0.1, 0.1);
+    let path = write(&stage, "plan.json", &plan(&arm, &sketch));
+    let (code, said) = ended(publish(&stage, &path, &[]));
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("no executor is running"), "{said}");
+}
