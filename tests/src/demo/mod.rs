@@ -49,6 +49,20 @@ struct Args {
     /// Copy the plans and the processes' output to this folder
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
+    /// Where the robot stands: x,y,yaw before the chair, or auto, which searches for longer
+    #[arg(
+        long,
+        default_value = "0.1,0.55,-1.2",
+        allow_hyphen_values = true,
+        value_name = "X,Y,YAW"
+    )]
+    base: String,
+    /// Height of the torso, with a given base, in m
+    #[arg(long, default_value_t = 0.2, value_name = "H")]
+    torso: f64,
+    /// Velocity of the fastest joint, in rad/s: slow enough to be watched
+    #[arg(long, default_value_t = 0.5, value_name = "V")]
+    v_max: f64,
     /// Seed of both plans
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -321,6 +335,11 @@ fn plan(
     options.extend(["--method", method, "--cost", cost].map(Into::into));
     options.extend(["--seed".into(), args.seed.to_string().into()]);
     options.extend(["--ik-samples".into(), args.ik_samples.to_string().into()]);
+    options.extend(["--v-max".into(), args.v_max.to_string().into()]);
+    options.extend(["--base".into(), args.base.clone().into()]);
+    if args.base != "auto" {
+        options.extend(["--torso".into(), args.torso.to_string().into()]);
+    }
     options.extend(["--out".into(), stage.file(&format!("{name}.json")).into()]);
     options.extend(["--json".into(), figures.clone().into()]);
     options.extend(more.iter().cloned());
