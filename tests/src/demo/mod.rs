@@ -236,10 +236,11 @@ fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     let knot = swap_knot(&Plan::read(&path)?);
     let at_s = knot_time(&Plan::read(&path)?, knot);
 
-    say(&format!("planning another one from its knot {knot} ({at_s:.1} s): TSP, least effort"));
+    say(&format!("planning another one from its knot {knot} ({at_s:.1} s): least effort"));
     let mut from = path.clone().into_os_string();
     from.push(format!("@{knot}"));
-    let second = plan(args, stage, "second", ["tsp", "effort"], &["--continue".into(), from])?;
+    let second =
+        plan(args, stage, "second", ["curvature", "effort"], &["--continue".into(), from])?;
 
     say("starting mock hardware and executor");
     let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
