@@ -23,7 +23,9 @@ impl World {
     /// Whether everything that moves with the arm keeps its margins. NaN and ∞ are not free.
     #[must_use]
     pub fn is_free(&self, q: &JointVector, contact: ToolContact) -> bool {
-        self.is_clear(q, contact, &Slack::NONE)
+        let inside = |(value, travel): (&f64, &f64)| value.is_finite() && value.abs() <= *travel;
+        q.iter().zip(&self.travel).all(inside)
+            && self.are_clear(&self.bodies.poses(q), contact, &Slack::NONE)
     }
 
     /// The first pair too near, for messages; from the exact check, so it is slow.
@@ -32,18 +34,18 @@ impl World {
         self.exact().first_hit(q, contact)
     }
 
-    /// Whether all margins hold with the slack of each body added.
-    pub(crate) fn is_clear(&self, q: &JointVector, contact: ToolContact, slack: &Slack) -> bool {
-        let inside = |(value, travel): (&f64, &f64)| value.is_finite() && value.abs() <= *travel;
-        if !q.iter().zip(&self.travel).all(inside) {
-            return false;
-        }
-        let poses = self.bodies.poses(q);
+    /// Whether all margins hold with the slack of each body added, the bodies standing at `poses`.
+    pub(crate) fn are_clear(
+        &self,
+        poses: &[Frame; MAX_BODIES],
+        contact: ToolContact,
+        slack: &Slack<'_>,
+    ) -> bool {
         self.moving.iter().rev().all(|shape| {
             let need = slack.body[shape.body] + TOLERANCE;
             self.is_clear_of_scan(shape, &poses[shape.body], contact, need)
                 && self.is_clear_of_fixed(shape, &poses[shape.body], need)
-        }) && self.are_pairs_clear(&poses, slack)
+        }) && self.are_pairs_clear(poses, slack)
     }
 
     fn is_clear_of_scan(
@@ -141,7 +143,7 @@ impl World {
         })
     }
 
-    fn are_pairs_clear(&self, poses: &[Frame; MAX_BODIES], slack: &Slack) -> bool {
+    fn are_pairs_clear(&self, poses: &[Frame; MAX_BODIES], slack: &Slack<'_>) -> bool {
         let mut centres = [Vector3::zeros(); 64];
         let count = self.moving.len().min(centres.len());
         for (centre, shape) in centres.iter_mut().zip(&self.moving) {

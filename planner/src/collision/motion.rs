@@ -2,18 +2,31 @@
 
 use super::ToolContact;
 use super::bodies::{Bodies, MAX_BODIES};
+use super::frame::Frame;
 use super::world::{Moving, World};
 use nalgebra::Vector3;
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
 use std::collections::VecDeque;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// How much farther than its margin each body has to be. \[m\]
 #[derive(Clone, Debug)]
-pub(crate) struct Slack {
+pub(crate) struct Slack<'a> {
     /// Relative to the root frame.
     pub(crate) body: [f64; MAX_BODIES],
-    /// Relative to another body, in which the joints before both do not count.
+    /// Relative to another body: this fraction of the motion's ways, if that is less.
+    ways: Option<(&'a Ways, f64)>,
+}
+
+/// What a straight joint line does to each body at most.
+#[derive(Clone, Debug)]
+struct Ways {
+    /// The longest way of a point in the root frame. \[m\]
+    body: [f64; MAX_BODIES],
+    /// In the frame of another body: the joints before both do not count. \[m\]
     between: [[f64; MAX_BODIES]; MAX_BODIES],
+    /// The acceleration of a point if the motion takes one unit of time. \[m\]
+    bend: [f64; MAX_BODIES],
 }
 
 /// How far the parts of each body can be from each joint's axis, whatever the configuration.
@@ -21,6 +34,8 @@ pub(crate) struct Slack {
 pub(crate) struct Reach {
     /// For each body: itself and the bodies that it hangs on, up the chain.
     lever: Vec<Vec<Lever>>,
+    /// For each body, in its frame: a ball about all its parts and the places they guard. \[m\]
+    ball: Vec<(Vector3<f64>, f64)>,
     /// A ball in the root frame that no moving part ever leaves. \[m\]
     pub(crate) centre: Vector3<f64>,
     pub(crate) radius: f64,
@@ -36,26 +51,21 @@ struct Lever {
     joint: usize,
     /// Times the joint's change gives the largest way of a point. \[m/rad\] or \[m/m\]
     way: f64,
+    /// Times the joint's change gives the body's own turn or slide.
+    rate: f64,
 }
 
 /// A motion is halved at most this often before it counts as not proven.
 const HALVINGS: u32 = 7;
 
-impl Slack {
-    pub(crate) const NONE: Self =
-        Self { body: [0.0; MAX_BODIES], between: [[0.0; MAX_BODIES]; MAX_BODIES] };
+impl Slack<'_> {
+    pub(crate) const NONE: Self = Self { body: [0.0; MAX_BODIES], ways: None };
 
     /// Bound of the motion of two bodies relative to each other. \[m\]
     #[inline]
     pub(crate) fn between(&self, a: usize, b: usize) -> f64 {
-        self.between[a][b]
-    }
-
-    fn scaled(&self, factor: f64) -> Self {
-        Self {
-            body: self.body.map(|x| x * factor),
-            between: self.between.map(|row| row.map(|x| x * factor)),
-        }
+        let both = self.body[a] + self.body[b];
+        self.ways.map_or(both, |(ways, fraction)| both.min(fraction * ways.between[a][b]))
     }
 }
 
@@ -80,7 +90,7 @@ impl Reach {
         let count = bodies.bodies.len();
         let parts = |body: usize| moving.iter().filter(move |m| m.body == body);
         let own_reach: Vec<f64> = (0..count)
-            .map(|b| parts(b).map(|m| m.reach_from_origin()).fold(0.0, f64::max))
+            .map(|b| parts(b).map(|m| m.reach_from(&Vector3::zeros())).fold(0.0, f64::max))
             .collect();
 
         let mut lever = vec![Vec::new(); count];
@@ -99,7 +109,8 @@ impl Reach {
                         beside + rest - to.norm()
                     }
                 };
-                levers.push(Lever { body: at, joint: b.joint, way: way * b.multiplier.abs() });
+                let rate = b.multiplier.abs();
+                levers.push(Lever { body: at, joint: b.joint, way: way * rate, rate });
                 let Some(parent) = b.parent else { break };
                 rest += b.rest.translation.norm() + slide(at);
                 below = Some(at);
@@ -118,13 +129,24 @@ impl Reach {
             }
             radius = radius.max(reach + (bodies.bodies[at].rest.translation - centre).norm());
         }
-        Self { lever, centre, radius, travel }
+        let ball = (0..count)
+            .map(|b| {
+                let centre = parts(b).map(|m| m.tree.root().centre).sum::<Vector3<f64>>()
+                    / parts(b).count().max(1) as f64;
+                (centre, parts(b).map(|m| m.reach_from(&centre)).fold(0.0, f64::max))
+            })
+            .collect();
+        Self { lever, ball, centre, radius, travel }
     }
 
     /// The largest ways between `a` and `b`.
-    fn slack(&self, bodies: &Bodies, a: &JointVector, b: &JointVector) -> Slack {
+    fn ways(&self, bodies: &Bodies, a: &JointVector, b: &JointVector) -> Ways {
         let change: [f64; MAX_DOF] = std::array::from_fn(|j| (b[j] - a[j]).abs());
-        let mut slack = Slack::NONE;
+        let mut slack = Ways {
+            body: [0.0; MAX_BODIES],
+            between: [[0.0; MAX_BODIES]; MAX_BODIES],
+            bend: [0.0; MAX_BODIES],
+        };
         let count = self.lever.len();
         for body in 0..count {
             let way = |until: Option<usize>| -> f64 {
@@ -136,6 +158,16 @@ impl Reach {
                     .sum()
             };
             slack.body[body] = way(None);
+            // A point x moves with ẍ = Σₖⱼ q̇ₖ q̇ⱼ hₖⱼ, where |hₖⱼ| is the distance of x from the
+            // axis of the later of both joints at most.
+            for k in &self.lever[body] {
+                for j in &self.lever[body] {
+                    let changes = change[k.joint] * change[j.joint];
+                    if changes > 0.0 {
+                        slack.bend[body] += changes * (k.way * j.rate).max(j.way * k.rate);
+                    }
+                }
+            }
             for other in 0..body {
                 if bodies.is_ancestor(other, body) {
                     slack.between[body][other] = way(Some(other));
@@ -147,6 +179,35 @@ impl Reach {
         }
         slack
     }
+
+    /// How far any point of each body is at most from where it is at `middle`, while the joints go
+    /// from there to both ends, which are half of `fraction` of the motion away: by the chord to
+    /// either end and how far the way can bend away from it, or by the ways along it.
+    fn slack<'a>(
+        &self,
+        ways: &'a Ways,
+        fraction: f64,
+        middle: &[Frame; MAX_BODIES],
+        ends: [&[Frame; MAX_BODIES]; 2],
+    ) -> Slack<'a> {
+        let half = 0.5 * fraction;
+        let mut body = [0.0; MAX_BODIES];
+        for (i, (centre, radius)) in self.ball.iter().enumerate() {
+            let from = middle[i].apply(centre);
+            let chord = ends
+                .iter()
+                .map(|end| {
+                    // A turn by θ moves a point at distance ρ by 2 sin(θ/2) ρ, and the Frobenius
+                    // norm of the change of the rotation matrix is 2 √2 sin(θ/2).
+                    let turn = (end[i].rotation - middle[i].rotation).norm() * FRAC_1_SQRT_2;
+                    (end[i].apply(centre) - from).norm() + turn * radius
+                })
+                .fold(0.0, f64::max);
+            let bend = ways.bend[i] * half * half / 8.0;
+            body[i] = (chord + bend).min(half * ways.body[i]);
+        }
+        Slack { body, ways: Some((ways, half)) }
+    }
 }
 
 impl World {
@@ -154,7 +215,7 @@ impl World {
     /// joint line from `a` to `b`. \[m\]
     #[must_use]
     pub fn motion_bound(&self, a: &JointVector, b: &JointVector) -> f64 {
-        self.reach.slack(&self.bodies, a, b).body.iter().copied().fold(0.0, f64::max)
+        self.reach.ways(&self.bodies, a, b).body.iter().copied().fold(0.0, f64::max)
     }
 
     /// Whether the whole straight joint line from `a` to `b` is proven free: by bisection until, at
@@ -163,7 +224,7 @@ impl World {
     /// 7 halvings (a motion that grazes a margin).
     #[must_use]
     pub fn motion_free(&self, a: &JointVector, b: &JointVector, contact: ToolContact) -> bool {
-        let ways = self.reach.slack(&self.bodies, a, b);
+        let ways = self.reach.ways(&self.bodies, a, b);
         // The ends first: they are where a useless motion is most often seen to be one.
         if !self.is_free(b, contact) || !self.is_free(a, contact) {
             return false;
@@ -172,12 +233,13 @@ impl World {
         let mut open = VecDeque::from([(0.0, 1.0, 0)]);
         while let Some((from, to, depth)) = open.pop_front() {
             let middle = 0.5 * (from + to);
-            let q: JointVector = std::array::from_fn(|j| a[j] + middle * (b[j] - a[j]));
-            let slack = ways.scaled(0.5 * (to - from));
-            if self.is_clear(&q, contact, &slack) {
+            let at = |t: f64| -> JointVector { std::array::from_fn(|j| a[j] + t * (b[j] - a[j])) };
+            let [first, poses, last] = [from, middle, to].map(|t| self.bodies.poses(&at(t)));
+            let slack = self.reach.slack(&ways, to - from, &poses, [&first, &last]);
+            if self.are_clear(&poses, contact, &slack) {
                 continue;
             }
-            if depth == HALVINGS || !self.is_free(&q, contact) {
+            if depth == HALVINGS || !self.are_clear(&poses, contact, &Slack::NONE) {
                 return false;
             }
             open.push_back((from, middle, depth + 1));

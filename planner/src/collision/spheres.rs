@@ -79,9 +79,9 @@ impl SphereTree {
         self.leaves().map(|s| beside(&s.centre) + s.radius).fold(0.0, f64::max)
     }
 
-    /// Upper bound of the distance of any covered point from the parent frame's origin. [m]
-    pub(crate) fn reach_from_origin(&self) -> f64 {
-        self.leaves().map(|s| s.centre.norm() + s.radius).fold(0.0, f64::max)
+    /// Upper bound of the distance of any covered point from `origin`, in the parent's frame. [m]
+    pub(crate) fn reach_from(&self, origin: &Vector3<f64>) -> f64 {
+        self.leaves().map(|s| (s.centre - origin).norm() + s.radius).fold(0.0, f64::max)
     }
 
     fn leaves(&self) -> impl Iterator<Item = &Sphere> {

@@ -248,9 +248,10 @@ impl Moving {
         self.corners().map(beside).fold(self.tree.reach_from_axis(axis), f64::max)
     }
 
-    /// The same, from the body's origin. \[m\]
-    pub(crate) fn reach_from_origin(&self) -> f64 {
-        self.corners().map(Vector3::norm).fold(self.tree.reach_from_origin(), f64::max)
+    /// The same, from a point of the body. \[m\]
+    pub(crate) fn reach_from(&self, origin: &Vector3<f64>) -> f64 {
+        let away = |c: &Vector3<f64>| (c - origin).norm();
+        self.corners().map(away).fold(self.tree.reach_from(origin), f64::max)
     }
 
     fn corners(&self) -> impl Iterator<Item = &Vector3<f64>> {
