@@ -10,12 +10,13 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use nullsweep_ipc_types::ports::Ipc;
 use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
 use nullsweep_planner::plan::Plan;
 use serde::{Deserialize, Serialize};
 
+use crate::endpoint::Fidelity;
 use crate::latency::{Percentiles, of_buckets};
 use crate::measured::Swept;
 use crate::parts;
@@ -63,6 +64,9 @@ struct Args {
     /// Velocity of the fastest joint, in rad/s: slow enough to be watched
     #[arg(long, default_value_t = 0.5, value_name = "V")]
     v_max: f64,
+    /// How true to a robot the mock arm is
+    #[arg(long, value_enum, default_value = "mechanism")]
+    fidelity: Fidelity,
     /// Seed of both plans
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -245,7 +249,7 @@ fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     say("starting mock hardware and executor");
     let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
     let mut witness = Witness::open(&ipc)?;
-    let mut mock = start_mock(stage, &path)?;
+    let mut mock = start_mock(args, stage, &path)?;
     let mut executor = start_executor(stage)?;
     alive(witness.ready(&ipc), &mut [&mut mock, &mut executor])?;
 
@@ -361,12 +365,14 @@ fn knot_time(plan: &Plan, knot: usize) -> f64 {
     plan.knots[knot].time_ns as f64 * 1e-9
 }
 
-fn start_mock(stage: &Stage, plan: &Path) -> anyhow::Result<Process> {
+fn start_mock(args: &Args, stage: &Stage, plan: &Path) -> anyhow::Result<Process> {
     let mut options = stage.place().to_vec();
     options.extend(["--plan".into(), plan.into()]);
     options.extend(["--json".into(), stage.file("mock.json").into()]);
     options.extend(["--record".into(), stage.file("record.csv").into()]);
     options.extend(["--timeout".into(), "100".into()]);
+    let fidelity = args.fidelity.to_possible_value();
+    options.extend(fidelity.map(|f| format!("--fidelity={}", f.get_name()).into()));
     Ok(stage.start(Part::Mock, "mock", options)?)
 }
 

@@ -1,7 +1,7 @@
 //! Plan files that `planner publish` sends, as a user does it by hand.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nullsweep_ipc_types::EventKind;
 use nullsweep_ipc_types::ports::Ipc;
@@ -60,7 +60,7 @@ fn write(stage: &Stage, name: &str, plan: &Plan) -> PathBuf {
     path
 }
 
-fn publish(stage: &Stage, plan: &PathBuf, more: &[&str]) -> Process {
+fn publish(stage: &Stage, plan: &Path, more: &[&str]) -> Process {
     let mut args: Vec<OsString> = vec!["publish".into(), plan.into()];
     args.extend(stage.place());
     args.extend(more.iter().map(OsString::from));
@@ -73,7 +73,7 @@ fn ended(mut process: Process) -> (Option<i32>, String) {
 }
 
 /// Mock and executor, the mock standing where the plan begins.
-fn start(stage: &Stage, plan: &PathBuf) -> (Witness, Process, Process) {
+fn start(stage: &Stage, plan: &Path) -> (Witness, Process, Process) {
     let ipc = Ipc::open(stage.robot(), Some(&stage.root())).expect("the test's own ports");
     let mut witness = Witness::open(&ipc).expect("the test can listen");
     let path = plan.to_str().expect("UTF-8");
