@@ -51,6 +51,10 @@ impl Default for PatchConfig {
     }
 }
 
+/// A fill-in patch gathers points within this share of the neighbourhood's radius: about half of
+/// the pad's short side, so that a pad over it sweeps them at any heading.
+const FILL_IN_SHARE: f64 = 0.8;
+
 /// A locally planar piece of the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
@@ -70,6 +74,53 @@ impl Patch {
     #[must_use]
     pub fn transformed(&self, pose: &Isometry3<f64>) -> Self {
         Self { centre: pose * self.centre, normal: pose.rotation * self.normal, ..self.clone() }
+    }
+}
+
+/// Patches over the points that `wanted` marks and that no motion has swept: where the pad has to
+/// go besides. Each stands on one point, takes its normal and the wanted points around it whose
+/// normals agree within `angle` \[rad\], the place with most of them first.
+#[must_use]
+pub fn fill_in(scan: &Scan, wanted: &[bool], config: &PatchConfig, angle: f64) -> Vec<Patch> {
+    let indices: Vec<u32> = (0..wanted.len() as u32).filter(|&i| wanted[i as usize]).collect();
+    let points: Vec<Point3<f64>> = indices.iter().map(|&i| scan.points[i as usize]).collect();
+    if points.is_empty() {
+        return Vec::new();
+    }
+    let grid = Grid::new(&points, config.epsilon);
+    let reach = FILL_IN_SHARE * config.epsilon;
+    let mut around: Vec<Vec<u32>> = Vec::with_capacity(points.len());
+    for &i in &indices {
+        let (centre, normal) = (&scan.points[i as usize], &scan.normals[i as usize]);
+        let mut near = Vec::new();
+        grid.within(centre, reach, |local, _, _| {
+            let index = indices[local as usize];
+            if scan.normals[index as usize].dot(normal) >= angle.cos() {
+                near.push(index);
+            }
+        });
+        near.sort_unstable();
+        around.push(near);
+    }
+    let mut open = wanted.to_vec();
+    let mut patches = Vec::new();
+    loop {
+        let left = |k: usize| around[k].iter().filter(|&&i| open[i as usize]).count();
+        let most = (0..indices.len()).map(|k| (left(k), std::cmp::Reverse(k))).max();
+        let Some((count, std::cmp::Reverse(k))) = most.filter(|m| m.0 >= config.min_points) else {
+            return patches;
+        };
+        let taken: Vec<u32> = around[k].iter().copied().filter(|&i| open[i as usize]).collect();
+        debug_assert_eq!(taken.len(), count);
+        for &i in &taken {
+            open[i as usize] = false;
+        }
+        let i = indices[k] as usize;
+        let (centre, normal) = (scan.points[i], scan.normals[i]);
+        let squares: f64 =
+            taken.iter().map(|&i| (scan.points[i as usize] - centre).dot(&normal).powi(2)).sum();
+        let rmse = (squares / taken.len() as f64).sqrt();
+        patches.push(Patch { centre, normal, points: taken, rmse });
     }
 }
 

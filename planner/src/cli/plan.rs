@@ -114,6 +114,9 @@ pub(super) struct PlanArgs {
     /// Trials of the order's search for each patch.
     #[arg(long, default_value_t = FormulationConfig::default().trials_per_cluster)]
     trials: u64,
+    /// How often patches are put over what the plan has not swept, and the plan is made again.
+    #[arg(long, default_value_t = 2)]
+    refinements: usize,
     /// Seed of every random choice: the same seed gives the same plan.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -262,6 +265,7 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("points", f.points.to_string());
     row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
+    row("fill-in patches", f.fill_in_patches.to_string());
     row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
     row("base x, y, yaw", format!("{:.3}, {:.3}, {:.3}", f.base[0], f.base[1], f.base[2]));
     for (name, position) in &f.held {
@@ -462,6 +466,7 @@ fn job(args: &PlanArgs, scene: &Scene) -> anyhow::Result<Job> {
             ..GraphConfig::default()
         },
         formulation: FormulationConfig { beta: args.beta, trials_per_cluster: args.trials },
+        refinements: args.refinements,
         collision: crate::collision::Options::default(),
         seed: args.seed,
     })

@@ -80,11 +80,11 @@ impl Default for Margins {
     fn default() -> Self {
         Self {
             self_clearance: 0.005,
-            environment: 0.010,
+            environment: 0.005,
             contact_growth: 0.005,
             contact_front: 0.015,
-            contact_clearance: 0.003,
-            contact_depth: 0.003,
+            contact_clearance: 0.001,
+            contact_depth: 0.005,
         }
     }
 }

@@ -1,0 +1,282 @@
+//! One plan for one set of patches, and the patches that are put over what it leaves out.
+
+use nullsweep_robot::{JointVector, MAX_DOF, Robot};
+use rayon::prelude::*;
+
+use super::{Clock, Job, PipelineError};
+use crate::cost::{self, Cost, CostKind, Effort, TaskTime};
+use crate::coverage;
+use crate::formulation::{self, Stop};
+use crate::graph::{self, Graph};
+use crate::layered;
+use crate::motion::{Leg, Mover};
+use crate::patches::{self, Patch, PatchConfig};
+use crate::plan::{Continues, FORMAT, Held, Plan, PlanKnot, SurfaceSample};
+use crate::progress::Progress;
+use crate::reach::{Sample, Workcell, reach, redundancies};
+use crate::scan::Scan;
+use crate::stance::Stance;
+use crate::surface::Surface;
+use crate::timing;
+use crate::verify;
+
+/// What every attempt at a plan shares, in the root frame.
+pub(super) struct Shop<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) job: &'a Job,
+    pub(super) stance: &'a Stance,
+    pub(super) cell: Workcell<'a>,
+    pub(super) scan: &'a Scan,
+    pub(super) surface: &'a Surface,
+    pub(super) start: JointVector,
+    /// The points of reachable patches.
+    pub(super) to_sweep: &'a [bool],
+    /// The points that were swept before the plan begins.
+    pub(super) already: &'a [bool],
+    pub(super) progress: &'a dyn Progress,
+}
+
+/// A plan with what it was made from.
+pub(super) struct Attempt {
+    pub(super) patches: Vec<Patch>,
+    visit: Vec<Option<Sample>>,
+    pub(super) graph: Graph,
+    pub(super) sequence: Sequence,
+    pub(super) plan: Plan,
+    /// The points to sweep that are not swept.
+    left: Vec<bool>,
+}
+
+impl Attempt {
+    /// How many of all points to sweep are swept, up to a constant.
+    pub(super) fn swept_points(&self) -> usize {
+        self.left.iter().filter(|l| !**l).count()
+    }
+}
+
+/// The joint path of the whole tour.
+pub(super) struct Sequence {
+    /// One leg into each stop.
+    legs: Vec<(usize, Leg)>,
+    pub(super) samples: usize,
+    pub(super) jumps: usize,
+    pub(super) dropped: Vec<usize>,
+}
+
+impl Shop<'_> {
+    /// A plan that visits the patches for which `visit` has a sample.
+    pub(super) fn attempt(
+        &self,
+        patches: Vec<Patch>,
+        visit: Vec<Option<Sample>>,
+        clock: &mut Clock,
+    ) -> Result<Attempt, PipelineError> {
+        let Self { job, cell, progress, .. } = *self;
+        progress.stage("graph", None);
+        let graph = clock.time("graph", || {
+            graph::build(
+                cell,
+                self.surface,
+                &patches,
+                &visit,
+                &job.graph,
+                &|total| progress.stage("graph", Some(total)),
+                &|| progress.tick(),
+            )
+        });
+        progress.stage("tour", None);
+        let tool_pose = cell.arm.tip_pose(&self.start) * job.tool.contact_in_tip();
+        let tour = clock.time("gtsp", || {
+            formulation::tour(
+                job.method,
+                &graph,
+                &patches,
+                &job.tool,
+                &tool_pose,
+                &job.formulation,
+                job.seed,
+            )
+        })?;
+        progress.stage("layered graph and transfers", None);
+        let velocity = cost::velocities(cell.arm, job.v_max);
+        let context = Context { shop: self, graph: &graph, patches: &patches, visit: &visit };
+        let sequence = clock.time("layered", || match job.cost {
+            CostKind::Effort => context.sequence(&Effort, &tour),
+            CostKind::Time => context.sequence(&TaskTime::new(&velocity), &tour),
+        })?;
+        let plan = self.assemble(&patches, &sequence, &velocity);
+        let poses = verify::contact_motion(&plan, cell.arm);
+        let swept = clock.time("coverage", || coverage::swept(self.scan, &poses, &job.tool));
+        let left =
+            (0..swept.len()).map(|i| self.to_sweep[i] && !swept[i] && !self.already[i]).collect();
+        Ok(Attempt { patches, visit, graph, sequence, plan, left })
+    }
+
+    /// The patches with others over what the attempt leaves out; `None` where nothing can be
+    /// gained.
+    pub(super) fn refine(
+        &self,
+        attempt: &Attempt,
+        clock: &mut Clock,
+    ) -> Option<(Vec<Patch>, Vec<Option<Sample>>)> {
+        self.progress.stage("fill in", None);
+        let config = PatchConfig { epsilon: self.fill_in_radius(), ..self.job.patches.clone() };
+        let angle = self.job.tool.reach_angle;
+        let extra = patches::fill_in(self.scan, &attempt.left, &config, angle);
+        let reached = clock.time("reach", || reach(self.cell, &extra, self.job.ik_samples, &|| ()));
+        if !reached.iter().any(Option::is_some) {
+            return None;
+        }
+        let mut patches = attempt.patches.clone();
+        let mut visit = attempt.visit.clone();
+        for (patch, sample) in extra.into_iter().zip(reached).filter(|(_, s)| s.is_some()) {
+            patches.push(patch);
+            visit.push(sample);
+        }
+        Some((patches, visit))
+    }
+
+    /// A pad over a fill-in patch sweeps all of it at any heading.
+    fn fill_in_radius(&self) -> f64 {
+        self.job.patches.epsilon.min(0.5 * self.job.tool.width)
+    }
+}
+
+/// What the layered search needs.
+struct Context<'a> {
+    shop: &'a Shop<'a>,
+    graph: &'a Graph,
+    patches: &'a [Patch],
+    visit: &'a [Option<Sample>],
+}
+
+impl Context<'_> {
+    /// The cheapest joint path through the tour's poses. A stop into which no motion is found is
+    /// left out.
+    fn sequence<C: Cost>(&self, cost: &C, tour: &[Stop]) -> Result<Sequence, PipelineError> {
+        let Shop { cell, job, start, progress, .. } = *self.shop;
+        let arm = cell.arm;
+        let mut continuous = [false; MAX_DOF];
+        for (c, limits) in continuous.iter_mut().zip(arm.limits()) {
+            *c = limits.continuous;
+        }
+        let values = redundancies(arm.ik().redundancy_range(), job.ik_samples);
+        let layers: Vec<Vec<Sample>> =
+            tour.par_iter().map(|stop| self.layer(stop, &values)).collect();
+        let stops: Vec<usize> = tour.iter().map(|stop| stop.patch).collect();
+        let mover = Mover::new(cell, self.graph, &stops, cost, start, job.seed);
+        let mut dropped = Vec::new();
+        let path = layered::shortest(cost, &continuous, &start, &layers, &mover, &mut |layer| {
+            let patch = stops[layer];
+            progress.note(&format!("patch {patch} is left out: no motion to it was found"));
+            dropped.push(patch);
+        });
+        if path.layers.is_empty() {
+            return Err(PipelineError::NoMotion { reachable: tour.len() });
+        }
+        let legs: Vec<(usize, Leg)> = path
+            .layers
+            .iter()
+            .map(|&layer| stops[layer])
+            .zip(path.motions.into_iter().map(|motion| motion.path))
+            .collect();
+        Ok(Sequence {
+            jumps: legs.iter().filter(|(_, leg)| leg.is_jump()).count(),
+            legs,
+            samples: layers.iter().map(Vec::len).sum(),
+            dropped,
+        })
+    }
+
+    /// All samples at a stop, or where it has none at the heading that reached the patch.
+    fn layer(&self, stop: &Stop, values: &[f64]) -> Vec<Sample> {
+        let layer = self.layer_at(stop, values);
+        match self.visit[stop.patch] {
+            Some(sample) if layer.is_empty() => {
+                self.layer_at(&Stop { heading: sample.heading, ..*stop }, values)
+            }
+            _ => layer,
+        }
+    }
+
+    /// All samples at a stop; for a symmetric pad also those of the opposite heading.
+    fn layer_at(&self, stop: &Stop, values: &[f64]) -> Vec<Sample> {
+        let cell = self.shop.cell;
+        let mut layer = Vec::new();
+        let turns: &[f64] = if cell.tool.symmetric { &[0.0, std::f64::consts::PI] } else { &[0.0] };
+        for turn in turns {
+            let stop = Stop { heading: stop.heading + turn, ..*stop };
+            let contact = formulation::pose(self.patches, cell.tool, &stop);
+            cell.samples(&contact, stop.heading, values, &mut layer);
+        }
+        layer
+    }
+}
+
+impl Shop<'_> {
+    /// Joins the legs, unwraps continuous joints and sets the times.
+    fn assemble(&self, patches: &[Patch], sequence: &Sequence, velocity: &JointVector) -> Plan {
+        let Self { robot, job, stance, scan, .. } = *self;
+        let arm = self.cell.arm;
+        let mut knots: Vec<PlanKnot> = Vec::new();
+        for (patch, leg) in &sequence.legs {
+            let shift = knots.last().map_or([0.0; MAX_DOF], |last| {
+                std::array::from_fn(|j| {
+                    let turns = (last.q[j] - leg.joints[0][j]) / std::f64::consts::TAU;
+                    turns.round() * std::f64::consts::TAU
+                })
+            });
+            let first = usize::from(!knots.is_empty());
+            for (q, line) in leg.joints.iter().zip(&leg.line).skip(first) {
+                let q = std::array::from_fn(|j| q[j] + shift[j]);
+                let line = line.map(|p| [p.x, p.y, p.z]);
+                knots.push(PlanKnot { time_ns: 0, q, line, patch: None });
+            }
+            if let Some(last) = knots.last_mut() {
+                last.patch = Some(*patch as u32);
+            }
+        }
+        // A knot that repeats its predecessor would take no time.
+        knots.dedup_by(|b, a| {
+            let same = a.q == b.q;
+            if same {
+                a.patch = a.patch.or(b.patch);
+                a.line = a.line.or(b.line);
+            }
+            same
+        });
+        let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
+        for (knot, time) in knots.iter_mut().zip(timing::bang_bang(&joints, velocity)) {
+            knot.time_ns = time;
+        }
+        Plan {
+            format: FORMAT,
+            robot: robot.name().into(),
+            fingerprint: arm.fingerprint(),
+            joints: arm.joint_names().to_vec(),
+            held: arm
+                .held_joints()
+                .iter()
+                .map(|h| Held { name: h.name.clone(), position: h.position })
+                .collect(),
+            tool: job.tool.clone(),
+            base: stance.base,
+            method: job.method,
+            cost: job.cost,
+            seed: job.seed,
+            knots,
+            patches: patches.iter().map(|p| p.centre.into()).collect(),
+            surface: (0..scan.points.len())
+                .map(|i| SurfaceSample {
+                    point: scan.points[i].into(),
+                    normal: scan.normals[i].into_inner().into(),
+                    reachable: self.to_sweep[i],
+                })
+                .collect(),
+            continues: job
+                .after
+                .as_ref()
+                .map(|a| Continues { digest: a.plan.digest(), knot: a.knot as u32 }),
+        }
+    }
+}
