@@ -23,6 +23,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod atsp;
+mod bound;
+pub mod cli;
+mod closed;
 mod eax;
 mod exact;
 mod instance;
@@ -37,9 +41,12 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod tour;
+mod transform;
 pub mod tsplib;
 
+pub use bound::lower_bound;
 pub use exact::solve as solve_exact;
 pub use instance::{Block, CostFn, Costs, Ends, Instance, InstanceError, Jump, OnDemand, Weight};
 pub use solve::{Budget, Control, Observer, Progress, Solution, SolveError, solve, solve_with};
 pub use tour::{Tour, TourCost, TourError};
+pub use transform::{Transformed, solve_transformed, transform};

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
+use super::bound::lower_bound;
 use super::exact;
 use super::instance::Instance;
 use super::order::Order;
@@ -188,7 +189,8 @@ pub(super) fn rounds(
     }
     let made = record.made;
     let (tour, cost) = record.best.expect("every epoch records a tour");
-    Solution { tour, cost, trials: made, elapsed: started.elapsed(), lower_bound: None }
+    let lower_bound = lower_bound(instance);
+    Solution { tour, cost, trials: made, elapsed: started.elapsed(), lower_bound }
 }
 
 /// Random streams of one seed, handed out in a fixed order before the threads start.
