@@ -40,6 +40,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     /// Send a plan to the executor.
     Publish(publish::PublishArgs),
+    /// Solve a generalized travelling-salesman file.
+    Gtsp(crate::gtsp::cli::GtspArgs),
     /// Say what a plan file holds.
     Inspect(inspect::InspectArgs),
 }
@@ -56,6 +58,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match cli.command {
         Command::Plan(args) => plan::run(&args),
         Command::Publish(args) => publish::run(&args),
+        Command::Gtsp(args) => crate::gtsp::cli::run(&args, &mut std::io::stdout().lock())
+            .map(|()| OK)
+            .map_err(anyhow::Error::from),
         Command::Inspect(args) => inspect::run(&args),
     };
     match result {

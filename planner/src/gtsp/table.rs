@@ -39,6 +39,11 @@ pub(super) struct Table {
     outer_root: bool,
 }
 
+/// Entries of cost blocks that the search keeps, 4 bytes each.
+const ROOM: usize = 1 << 28;
+/// Neighbours of each cluster whose blocks are kept where all would not fit.
+const KEPT: usize = 24;
+
 /// Where a block lies; absent blocks share one of zeros and add their price.
 #[derive(Clone, Copy)]
 struct Pair {
@@ -51,6 +56,8 @@ struct Raw<'a> {
     m: usize,
     root: usize,
     disguised: Option<f64>,
+    /// Pairs that are kept where not all of them fit; the search sees the others as jumps.
+    kept: Option<Vec<bool>>,
 }
 
 impl Raw<'_> {
@@ -59,6 +66,9 @@ impl Raw<'_> {
     }
 
     fn maybe_adjacent(&self, a: usize, b: usize) -> bool {
+        if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
+            return false;
+        }
         a >= self.instance.clusters()
             || b >= self.instance.clusters()
             || self.instance.adjacent(a, b)
@@ -83,6 +93,9 @@ impl Raw<'_> {
     }
 
     fn price(&self, a: usize, b: usize) -> f64 {
+        if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
+            return f64::INFINITY; // seen as the dearest of all
+        }
         if let Some(price) = self.disguised {
             return price;
         }
@@ -93,6 +106,45 @@ impl Raw<'_> {
         } else {
             self.instance.jump_price(a, b)
         }
+    }
+
+    /// Where the blocks would need too much room, keeps those to and from the nearest clusters, by
+    /// a few of their nodes.
+    fn keep_what_fits(&mut self) {
+        let entries: usize = self
+            .pairs()
+            .filter(|&(a, b)| self.maybe_adjacent(a, b))
+            .map(|(a, b)| self.size(a) * self.size(b))
+            .sum();
+        // Asymmetric costs are stored both ways.
+        if 2 * entries <= ROOM {
+            return;
+        }
+        let few = |c: usize| (0..self.size(c)).step_by(self.size(c).div_ceil(4));
+        let m = self.m;
+        let mut kept = vec![false; m * m];
+        for a in 0..m {
+            let mut near: Vec<(f64, usize)> = (0..m)
+                .filter(|&b| a != b && self.maybe_adjacent(a, b))
+                .map(|b| {
+                    let arcs = few(a).flat_map(|i| few(b).map(move |j| (i, j)));
+                    let low = arcs
+                        .filter_map(|(i, j)| self.arc(a, i, b, j))
+                        .fold(f64::INFINITY, f64::min);
+                    (low, b)
+                })
+                .collect();
+            near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+            for &(_, b) in near.iter().take(KEPT) {
+                kept[a * m + b] = true;
+                kept[b * m + a] = true;
+            }
+        }
+        for c in 0..m {
+            kept[c * m + self.root] = true;
+            kept[self.root * m + c] = true;
+        }
+        self.kept = Some(kept);
     }
 
     fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
@@ -123,7 +175,8 @@ impl Table {
                 ((0..clusters).min_by_key(|&c| instance.sizes()[c]).unwrap_or(0), clusters)
             }
         };
-        let mut raw = Raw { instance, m, root, disguised: None };
+        let mut raw = Raw { instance, m, root, disguised: None, kept: None };
+        raw.keep_what_fits();
         let statistics = statistics(&raw);
         raw.disguised = statistics.disguised;
 

@@ -8,12 +8,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::solve::rounds;
 use super::{
-    Block, Budget, Control, Costs, Ends, Instance, Jump, Solution, Tour, TourError, solve,
-    solve_exact,
+    Block, Budget, Control, Costs, Ends, Instance, Jump, OnDemand, Solution, Tour, TourError,
+    lower_bound, solve, solve_exact, solve_with, tsplib,
 };
 
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+pub(super) enum Kind {
     Symmetric,
     Asymmetric,
     Sparse,
@@ -22,10 +22,16 @@ enum Kind {
     HugeJump,
 }
 
-const KINDS: [Kind; 6] =
+pub(super) const KINDS: [Kind; 6] =
     [Kind::Symmetric, Kind::Asymmetric, Kind::Sparse, Kind::Equal, Kind::Zero, Kind::HugeJump];
 
-fn random_instance(kind: Kind, clusters: usize, widest: usize, ends: usize, seed: u64) -> Instance {
+pub(super) fn random_instance(
+    kind: Kind,
+    clusters: usize,
+    widest: usize,
+    ends: usize,
+    seed: u64,
+) -> Instance {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let sizes: Vec<usize> = (0..clusters).map(|_| rng.random_range(1..=widest)).collect();
     let n: usize = sizes.iter().sum();
@@ -93,6 +99,9 @@ proptest! {
         prop_assert!(reached >= least - 1e-6 * least.abs(), "{} below the optimum {}", reached, least);
         prop_assert!(reached <= least + 1e-6 * least.abs(), "{} above the optimum {}", reached, least);
         prop_assert_eq!(found.cost.jumps, cost.jumps);
+        if let Some(bound) = lower_bound(&instance) {
+            prop_assert!(bound <= least + 1e-6 * least.abs(), "{} above the optimum {}", bound, least);
+        }
     }
 
     #[test]
@@ -133,4 +142,70 @@ fn bad_tours_are_named() {
     assert_eq!(check(&[1], &[0]), Err(TourError::Length { clusters: 1, nodes: 1, expected: 2 }));
     assert_eq!(check(&[1, 1], &[0, 1]), Err(TourError::Twice { cluster: 1 }));
     assert_eq!(check(&[0, 1], &[0, 2]), Err(TourError::Index { position: 1, cluster: 1, node: 2 }));
+}
+
+#[test]
+fn costs_on_demand_equal_stored_ones() {
+    let sizes = vec![4; 30];
+    let point = |a: usize, i: usize| {
+        let k = (a * 4 + i) as f64;
+        [(k * 0.7).sin() * 10.0, (k * 1.3).cos() * 10.0]
+    };
+    let cost = move |a: usize, i: usize, b: usize, j: usize| {
+        let (p, q) = (point(a, i), point(b, j));
+        (p[0] - q[0]).hypot(p[1] - q[1])
+    };
+    let n = 120;
+    let matrix: Vec<f64> =
+        (0..n * n).map(|k| (k / n, k % n)).map(|(u, v)| cost(u / 4, u % 4, v / 4, v % 4)).collect();
+    let solve = |costs| {
+        let instance = Instance::new(&sizes, costs, Jump::Forbidden, Ends::Closed).expect("fits");
+        solve(&instance, &Budget::trials(3000), 3).expect("limited")
+    };
+    let on_demand = OnDemand { neighbours: None, cost: std::sync::Arc::new(cost) };
+    let (one, two) = (solve(Costs::Dense(matrix)), solve(Costs::OnDemand(on_demand)));
+    assert_eq!((one.tour, one.cost), (two.tour, two.cost));
+}
+
+#[test]
+fn progress_improves_and_can_stop_the_search() {
+    let instance = random_instance(KINDS[0], 40, 4, 0, 1);
+    let mut told = Vec::new();
+    let mut observe = |p: &super::Progress<'_>| {
+        p.tour.check(&instance).expect("valid");
+        told.push(p.cost.total());
+        if told.len() == 2 {
+            std::ops::ControlFlow::Break(())
+        } else {
+            std::ops::ControlFlow::Continue(())
+        }
+    };
+    let control = Control { progress: Some(&mut observe), cancel: None };
+    let solution = solve_with(&instance, &Budget::trials(u64::MAX), 1, control).expect("limited");
+    assert_eq!(told.len(), 2);
+    assert!(told[1] < told[0]);
+    assert_eq!(solution.cost.total(), told[1]);
+    let cancelled = std::sync::atomic::AtomicBool::new(true);
+    let control = Control { progress: None, cancel: Some(&cancelled) };
+    let solution = solve_with(&instance, &Budget::trials(u64::MAX), 1, control).expect("limited");
+    solution.tour.check(&instance).expect("valid even so");
+}
+
+#[test]
+fn published_optima_are_reached() {
+    let dir =
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/gtsplib"));
+    if !dir.is_dir() {
+        eprintln!("skipped: no GTSPLIB instances at {}", dir.display());
+        return;
+    }
+    for (name, optimum) in
+        [("11berlin52", 4040.0), ("14ft70", 7707.0), ("35ftv170", 1205.0), ("53gil262", 1013.0)]
+    {
+        let file = tsplib::read_gtsp(&dir.join(name).with_extension("gtsp")).expect("readable");
+        let budget = Budget { target: Some(optimum), ..Budget::trials(60_000) };
+        let solution = solve(&file.instance, &budget, 1).expect("limited");
+        solution.tour.check(&file.instance).expect("valid");
+        assert_eq!(solution.cost.total(), optimum, "{name}");
+    }
 }

@@ -1,6 +1,8 @@
 //! TSPLIB and GTSPLIB files: instances read and written, tours read and written.
 
 mod read;
+#[cfg(test)]
+mod tests;
 mod weights;
 mod write;
 
