@@ -19,7 +19,7 @@ const STEPS: usize = 200;
 pub fn lower_bound(instance: &Instance) -> Option<f64> {
     let closed = Closed::new(instance);
     let (n, m) = (closed.nodes.len(), closed.clusters);
-    if m < 3 || m > MOST_CLUSTERS || n * n > MOST_PAIRS {
+    if !(3..=MOST_CLUSTERS).contains(&m) || n * n > MOST_PAIRS {
         return None;
     }
     let mut low = vec![f64::INFINITY; m * m];

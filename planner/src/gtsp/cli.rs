@@ -17,7 +17,7 @@ use super::{TourCost, lower_bound};
 pub struct GtspArgs {
     /// Instance file.
     pub file: PathBuf,
-    /// Wall-clock limit [s]; 10 where neither it nor --trials is given.
+    /// Wall-clock limit in seconds; 10 where neither it nor --trials is given.
     #[arg(long)]
     pub seconds: Option<f64>,
     /// Limit in trials: the result then depends on the file, the seed and this number alone.

@@ -112,7 +112,7 @@ impl LocalSearch {
 
     fn improve(&mut self, table: &Table, tour: &mut Order, c: u32) -> bool {
         let m = tour.order.len();
-        if m < 8 {
+        if m < super::search::SMALL {
             return false;
         }
         let mut best = (0_i64, None);

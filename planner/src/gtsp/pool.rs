@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::eax::Crossover;
 use super::local::LocalSearch;
 use super::order::Order;
-use super::search::{Cooling, construct, iterate, settle};
+use super::search::{Cooling, SMALL, construct, iterate, settle};
 use super::solve::{Record, Streams};
 use super::table::Table;
 
@@ -34,6 +34,7 @@ pub(super) fn evolve(
     let size = (FIRST_POOL as u64) << epoch.min(3);
     // Small budgets get small pools: half of the trials are left for the crossing.
     let size = size.min(limit / 64).max(1) as usize;
+    let size = if table.m < SMALL { 1 } else { size };
     let trials = (TRIALS_PER_CLUSTER * table.m as u64).min(limit / (2 * size as u64));
     let tasks: Vec<_> = (0..size).map(|k| (k, streams.next())).collect();
     let fresh: Vec<(Order, u64)> = tasks
@@ -74,6 +75,9 @@ fn cross_until_idle(
     stop: &(dyn Fn() -> bool + Sync),
     record: &mut Record<'_, '_>,
 ) {
+    if table.m < SMALL {
+        return; // Each tour is an optimum already.
+    }
     let mut idle = 0;
     while idle < IDLE_GENERATIONS && pool.len() > 1 && record.made < end && !stop() {
         pool.shuffle(&mut streams.next());

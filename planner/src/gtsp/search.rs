@@ -7,12 +7,16 @@ use super::local::LocalSearch;
 use super::order::Order;
 use super::table::Table;
 
+/// Tours of fewer clusters, the root's included, are enumerated.
+pub(super) const SMALL: usize = 9;
 /// Longest of the two stretches that a kick exchanges.
 const KICK: usize = 30;
 
 /// A randomised nearest-neighbour tour, nodes chosen as it goes.
 pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> Order {
     let m = table.m;
+    // Some tours keep to the nearest, some stray.
+    let odds = rng.random_range(2..12);
     let mut chosen = vec![0; m];
     let mut visited = vec![false; m];
     let mut order = Vec::with_capacity(m);
@@ -37,7 +41,7 @@ pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> Order {
             }
         };
         for (b, _) in table.near_out(here) {
-            let skip = rng.random_range(0..8) == 0;
+            let skip = rng.random_range(0..odds) == 0;
             consider(b, &mut best, skip);
         }
         if best.1 == here {
@@ -108,7 +112,7 @@ pub(super) fn iterate(
     stop: &dyn Fn() -> bool,
 ) -> u64 {
     let m = table.m;
-    if m < 8 {
+    if m < SMALL {
         enumerate(table, local, tour);
         return 0;
     }
@@ -144,24 +148,27 @@ pub(super) fn iterate(
     made
 }
 
-/// Exchanges two neighbouring stretches at a random place.
+/// Turns the order of two or three neighbouring stretches around at a random place; of three, so
+/// that no single exchange of the local search undoes it.
 fn kick(table: &Table, local: &mut LocalSearch, tour: &mut Order, rng: &mut ChaCha8Rng) {
     let m = tour.order.len();
-    let longest = KICK.min((m - 2) / 2).max(1);
-    let one = rng.random_range(1..=longest);
-    let two = rng.random_range(1..=longest.min(m - 1 - one));
-    let first = rng.random_range(1..=m - one - two);
-    let (middle, last) = (first + one, first + one + two - 1);
+    let longest = KICK.min((m - 2) / 3).max(1);
+    let third = if rng.random::<bool>() { rng.random_range(1..=longest) } else { 0 };
+    let lengths = [rng.random_range(1..=longest), rng.random_range(1..=longest), third];
+    let all: usize = lengths.iter().sum();
+    let first = rng.random_range(1..=m - all);
+    let last = first + all - 1;
     let before = tour.stretch_cost(first - 1, last + 1);
-    tour.exchange(first, middle, last);
-    let middle = first + two;
-    let joints = [(first - 1, first), (middle - 1, middle), (last, last + 1)];
-    for (p, _) in joints {
+    // a b c becomes b c a, then c b a.
+    tour.exchange(first, first + lengths[0], last);
+    if third > 0 {
+        tour.exchange(first, first + lengths[1], first + lengths[1] + third - 1);
+    }
+    let joints = [first - 1, first + third - 1, first + third + lengths[1] - 1, last];
+    for p in joints {
         tour.refresh(table, p);
+        local.push(tour.at(p).0);
+        local.push(tour.at(p + 1).0);
     }
     tour.cost += tour.stretch_cost(first - 1, last + 1) - before;
-    for (p, q) in joints {
-        local.push(tour.at(p).0);
-        local.push(tour.at(q).0);
-    }
 }

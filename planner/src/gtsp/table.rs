@@ -39,6 +39,8 @@ pub(super) struct Table {
     outer_root: bool,
 }
 
+/// Costs of at most this much count as zero.
+const TINY: f64 = 1e-200;
 /// Entries of cost blocks that the search keeps, 4 bytes each.
 const ROOM: usize = 1 << 28;
 /// Neighbours of each cluster whose blocks are kept where all would not fit.
@@ -180,8 +182,14 @@ impl Table {
         let statistics = statistics(&raw);
         raw.disguised = statistics.disguised;
 
-        let cap = statistics.largest.max(f64::MIN_POSITIVE);
-        let ceiling = JUMP_FACTOR * cap;
+        // Without any arc, or with free ones only, jumps alone set the scale.
+        let cap = if statistics.largest > TINY { statistics.largest } else { 1.0 };
+        // Prices of a table differ among themselves, which must not be lost.
+        let dearest = match instance.jump() {
+            Jump::Table(table) => table.iter().copied().fold(0.0, f64::max),
+            _ => 0.0,
+        };
+        let ceiling = dearest.max(JUMP_FACTOR * cap);
         let room = f64::from(1 << 30) / (m + 2) as f64;
         let whole_prices = match (statistics.disguised, instance.jump()) {
             (Some(_), _) | (None, Jump::Forbidden) => true,

@@ -21,7 +21,7 @@ pub enum WeightType {
     Ceil2d,
     /// Euclidean in the plane, rounded down.
     Floor2d,
-    /// Great-circle distance [km] of latitudes and longitudes in degrees.minutes.
+    /// Great-circle distance in km of latitudes and longitudes in degrees.minutes.
     Geo,
     /// Pseudo-Euclidean distance of att48 and att532.
     Att,
