@@ -100,6 +100,7 @@ impl<H: Hardware> Driver<H> {
         });
         let measured = states.as_ref().map(|states| {
             let held = held(states);
+            // Each cycle, so that the worker has them before anybody can have seen Hold.
             self.slots.held.force_push(held);
             let mut measured = measured(states);
             if self.has_moved(held) {

@@ -1,6 +1,6 @@
 //! The program as a process, against an endpoint in a thread of the test.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,7 +32,7 @@ struct Seen {
 
 struct System {
     root: TempDir,
-    executor: Child,
+    executor: Executor,
     log: JoinHandle<Vec<String>>,
     endpoint: JoinHandle<Seen>,
     over: Arc<AtomicBool>,
@@ -44,15 +44,26 @@ fn arm() -> Arm {
     Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).unwrap()
 }
 
-fn executor(root: &TempDir, more: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_executor"))
+/// The process; a test that fails leaves none behind.
+struct Executor(Child);
+
+impl Drop for Executor {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn executor(root: &TempDir, more: &[&str]) -> Executor {
+    let child = Command::new(env!("CARGO_BIN_EXE_executor"))
         .arg("run")
         .arg("--ipc-root")
         .arg(root.path())
         .args(more)
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap()
+        .unwrap();
+    Executor(child)
 }
 
 impl System {
@@ -69,7 +80,7 @@ impl System {
         let arguments: Vec<&str> =
             PATIENT.iter().copied().chain(more.iter().map(String::as_str)).collect();
         let mut executor = executor(&root, &arguments);
-        let lines = BufReader::new(executor.stderr.take().unwrap()).lines();
+        let lines = BufReader::new(executor.0.stderr.take().unwrap()).lines();
         let log = thread::spawn(move || lines.map_while(Result::ok).collect());
         let over = Arc::new(AtomicBool::new(false));
         let endpoint = {
@@ -125,7 +136,7 @@ impl System {
     }
 
     fn terminate(&self) {
-        let kill = Command::new("kill").arg(self.executor.id().to_string()).status().unwrap();
+        let kill = Command::new("kill").arg(self.executor.0.id().to_string()).status().unwrap();
         assert!(kill.success());
     }
 
@@ -135,7 +146,7 @@ impl System {
     }
 
     fn finish(mut self) -> (Seen, Vec<String>) {
-        let status = self.executor.wait().unwrap();
+        let status = self.executor.0.wait().unwrap();
         self.over.store(true, Ordering::Release);
         let log = self.log.join().unwrap();
         assert!(status.success(), "{status}: {log:#?}");
@@ -294,14 +305,15 @@ fn a_plan_that_runs_at_shutdown_is_stopped_and_told() {
 #[test]
 fn a_second_executor_is_refused_and_a_killed_one_replaced() {
     let mut system = System::start();
-    let second = executor(&system.root, PATIENT).wait_with_output().unwrap();
-    assert!(!second.status.success());
-    let text = String::from_utf8_lossy(&second.stderr);
+    let mut second = executor(&system.root, PATIENT);
+    let mut text = String::new();
+    second.0.stderr.take().unwrap().read_to_string(&mut text).unwrap();
+    assert!(!second.0.wait().unwrap().success());
     assert!(text.contains("all places are taken"), "{text}");
     system.wait_for(Mode::Hold);
 
-    system.executor.kill().unwrap();
-    system.executor.wait().unwrap();
+    system.executor.0.kill().unwrap();
+    system.executor.0.wait().unwrap();
     let mut publisher = system.ipc.plan_publisher(2).unwrap();
     let (header, knots) = system.line([0.0; 16], 0.1, 1.0);
     // The dead one's port is there until somebody sweeps; then a publication says so.
@@ -309,7 +321,7 @@ fn a_second_executor_is_refused_and_a_killed_one_replaced() {
     let e = publisher.publish(&header, &knots[..2]).unwrap_err();
     assert!(matches!(e, IpcError::NoExecutor { .. }), "{e}");
     system.executor = executor(&system.root, PATIENT);
-    let lines = BufReader::new(system.executor.stderr.take().unwrap()).lines();
+    let lines = BufReader::new(system.executor.0.stderr.take().unwrap()).lines();
     system.log = thread::spawn(move || lines.map_while(Result::ok).collect());
     system.wait_for(Mode::Hold);
     system.end();
@@ -341,8 +353,8 @@ fn a_killed_run_replays_bit_for_bit() {
     assert_eq!(next(&events, other).0, EventKind::Finished);
     // Long enough in Hold for the files to change over at least once.
     thread::sleep(Duration::from_millis(3500));
-    system.executor.kill().unwrap();
-    system.executor.wait().unwrap();
+    system.executor.0.kill().unwrap();
+    system.executor.0.wait().unwrap();
     system.over.store(true, Ordering::Release);
 
     let files: Vec<_> = (0..2)

@@ -93,13 +93,15 @@ impl<T: Payload> Receiver<T> {
     /// A copy of the newest sample that waits; the older ones are dropped and counted. Reads at
     /// most one buffer, so that a fast sender cannot keep a reader busy.
     pub fn newest(&self) -> Result<Option<Newest<T>>, PortError> {
-        let mut newest: Option<Newest<T>> = None;
+        // The samples are looked at where they lie; only the last one is copied.
+        let mut newest = None;
+        let mut skipped = 0;
         for _ in 0..self.subscriber.buffer_size() {
-            let Some(value) = self.receive()? else { break };
-            let skipped = newest.map_or(0, |n| n.skipped + 1);
-            newest = Some(Newest { value, skipped });
+            let Some(sample) = self.subscriber.receive()? else { break };
+            skipped += usize::from(newest.is_some());
+            newest = Some(sample);
         }
-        Ok(newest)
+        Ok(newest.map(|sample| Newest { value: *sample, skipped }))
     }
 
     /// How many senders there are.
