@@ -12,6 +12,7 @@ use super::exact;
 use super::instance::Instance;
 use super::order::Order;
 use super::pool::evolve;
+use super::search::SMALL;
 use super::table::Table;
 use super::tour::{Tour, TourCost};
 
@@ -183,7 +184,8 @@ pub(super) fn rounds(
     for epoch in 0.. {
         let left = limit.saturating_sub(record.made);
         evolve(&table, epoch, left, &mut elite, &mut streams, &stop, &mut record);
-        if record.made >= limit || stop() {
+        // So few clusters are enumerated: one epoch has the optimum.
+        if record.made >= limit || stop() || table.m < SMALL {
             break;
         }
     }
