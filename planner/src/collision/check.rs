@@ -41,10 +41,22 @@ impl World {
         contact: ToolContact,
         slack: &Slack<'_>,
     ) -> bool {
+        // The fixed shapes that the ball about each body does not prove far.
+        let mut near = [0u128; MAX_BODIES];
+        for (body, (centre, radius)) in self.reach.ball.iter().enumerate() {
+            let centre = poses[body].apply(centre);
+            for (index, fixed) in self.fixed.iter().enumerate() {
+                let reach = radius + fixed.margin + slack.body[body] + TOLERANCE;
+                if fixed.box_distance_squared(&centre) < reach * reach {
+                    near[body] |= fixed_bit(index);
+                }
+            }
+        }
         self.moving.iter().rev().all(|shape| {
-            let need = slack.body[shape.body] + TOLERANCE;
-            self.is_clear_of_scan(shape, &poses[shape.body], contact, need)
-                && self.is_clear_of_fixed(shape, &poses[shape.body], need)
+            let (body, pose) = (shape.body, &poses[shape.body]);
+            let need = slack.body[body] + TOLERANCE;
+            self.is_clear_of_scan(shape, pose, contact, need)
+                && (near[body] == 0 || self.is_clear_of_fixed(shape, pose, near[body], need))
         }) && self.are_pairs_clear(poses, slack)
     }
 
@@ -76,16 +88,21 @@ impl World {
             None => self.margins.environment,
         };
         let need = margin + slack;
+        if shape
+            .tree
+            .all(|s| self.field.is_farther(&pose.apply(&s.centre), s.radius + need), |_| false)
+        {
+            return true;
+        }
+        // All points near enough lie in the shape's bounds grown by what is needed.
         let at = pose.then(&shape.place);
-        shape.tree.all(
-            |s| self.field.is_farther(&pose.apply(&s.centre), s.radius + need),
-            |s| {
-                self.field.all_within(&pose.apply(&s.centre), s.radius + need, |p| {
-                    shape.solid.distance_bound(&at.apply_inverse(p)) >= need
-                        || self.point_value(shape, pose, contact, p, slack) >= slack
-                })
-            },
-        )
+        let (low, high) = shape.solid.bounds();
+        let centre = at.apply(&(0.5 * (low + high)));
+        let half = at.rotation.abs() * (0.5 * (high - low)) + Vector3::repeat(need);
+        self.field.all_in_box(&(centre - half), &(centre + half), |p| {
+            shape.solid.distance_bound(&at.apply_inverse(p)) >= need
+                || self.point_value(shape, pose, contact, p, slack) >= slack
+        })
     }
 
     /// A lower bound of how far the shape can move, relative to the scan point `p` (root frame),
@@ -124,10 +141,10 @@ impl World {
             .max(free)
     }
 
-    fn is_clear_of_fixed(&self, shape: &Moving, pose: &Frame, slack: f64) -> bool {
+    fn is_clear_of_fixed(&self, shape: &Moving, pose: &Frame, near: u128, slack: f64) -> bool {
         let root = shape.tree.root();
         let centre = pose.apply(&root.centre);
-        shape.against.iter().all(|&index| {
+        shape.against.iter().filter(|&&index| near & fixed_bit(index) != 0).all(|&index| {
             let fixed = &self.fixed[index];
             let need = fixed.margin + slack;
             let reach = root.radius + need;
@@ -144,18 +161,30 @@ impl World {
     }
 
     fn are_pairs_clear(&self, poses: &[Frame; MAX_BODIES], slack: &Slack<'_>) -> bool {
-        let mut centres = [Vector3::zeros(); 64];
-        let count = self.moving.len().min(centres.len());
-        for (centre, shape) in centres.iter_mut().zip(&self.moving) {
-            *centre = poses[shape.body].apply(&shape.tree.root().centre);
+        let mut balls = [Vector3::zeros(); MAX_BODIES];
+        for (body, (centre, _)) in self.reach.ball.iter().enumerate() {
+            balls[body] = poses[body].apply(centre);
         }
+        let mut bodies = (usize::MAX, usize::MAX);
+        let (mut need, mut far) = (0.0, false);
         self.pairs.iter().all(|&(a, b)| {
             let (first, second) = (&self.moving[a], &self.moving[b]);
+            let (i, j) = (first.body, second.body);
+            if bodies != (i, j) {
+                // The pairs of two bodies follow each other.
+                bodies = (i, j);
+                need = self.margins.self_clearance + slack.between(i, j) + TOLERANCE;
+                let reach = self.reach.ball[i].1 + self.reach.ball[j].1 + need;
+                far = (balls[i] - balls[j]).norm_squared() >= reach * reach;
+            }
+            if far {
+                return true;
+            }
             let (ra, rb) = (first.tree.root().radius, second.tree.root().radius);
-            let need =
-                self.margins.self_clearance + slack.between(first.body, second.body) + TOLERANCE;
             let reach = ra + rb + need;
-            if a < count && b < count && (centres[a] - centres[b]).norm_squared() >= reach * reach {
+            let between = poses[i].apply(&first.tree.root().centre)
+                - poses[j].apply(&second.tree.root().centre);
+            if between.norm_squared() >= reach * reach {
                 return true;
             }
             // The spheres of the smaller shape against the solid of the larger.
@@ -164,6 +193,12 @@ impl World {
             is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
         })
     }
+}
+
+/// The bit of a fixed shape; beyond 127 they share the last one.
+#[inline]
+fn fixed_bit(index: usize) -> u128 {
+    1 << index.min(127)
 }
 
 impl Fixed {

@@ -113,6 +113,36 @@ impl Field {
         (self.min - p).sup(&(p - self.max)).map(|x| x.max(0.0)).norm_squared()
     }
 
+    /// Calls `test` on every point in the box, until it is false; whether it never was.
+    #[inline]
+    pub(crate) fn all_in_box(
+        &self,
+        min: &Vector3<f64>,
+        max: &Vector3<f64>,
+        mut test: impl FnMut(&Vector3<f64>) -> bool,
+    ) -> bool {
+        if self.points.is_empty() {
+            return true;
+        }
+        let grid = &self.cells;
+        let (low, high) = (grid.clamped_cell(min), grid.clamped_cell(max));
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
+                let row = (z * grid.size[1] + y) * grid.size[0];
+                // Cells of one row follow each other, so their points are one slice.
+                let from = self.starts[row + low[0]] as usize;
+                let to = self.starts[row + high[0] + 1] as usize;
+                for p in &self.points[from..to] {
+                    let inside = (0..3).all(|i| p[i] >= min[i] && p[i] <= max[i]);
+                    if inside && !test(p) {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+
     /// Calls `test` on every point within `radius` of `p`, until it is false; whether it never was.
     #[inline]
     pub(crate) fn all_within(
@@ -121,27 +151,10 @@ impl Field {
         radius: f64,
         mut test: impl FnMut(&Vector3<f64>) -> bool,
     ) -> bool {
-        if self.points.is_empty() {
-            return true;
-        }
-        let grid = &self.cells;
-        let low = grid.clamped_cell(&(p - Vector3::repeat(radius)));
-        let high = grid.clamped_cell(&(p + Vector3::repeat(radius)));
-        let squared = radius * radius;
-        for z in low[2]..=high[2] {
-            for y in low[1]..=high[1] {
-                let row = (z * grid.size[1] + y) * grid.size[0];
-                // Cells of one row follow each other, so their points are one slice.
-                let from = self.starts[row + low[0]] as usize;
-                let to = self.starts[row + high[0] + 1] as usize;
-                for point in &self.points[from..to] {
-                    if (point - p).norm_squared() <= squared && !test(point) {
-                        return false;
-                    }
-                }
-            }
-        }
-        true
+        let (reach, squared) = (Vector3::repeat(radius), radius * radius);
+        self.all_in_box(&(p - reach), &(p + reach), |point| {
+            (point - p).norm_squared() > squared || test(point)
+        })
     }
 }
 

@@ -35,7 +35,7 @@ pub(crate) struct Reach {
     /// For each body: itself and the bodies that it hangs on, up the chain.
     lever: Vec<Vec<Lever>>,
     /// For each body, in its frame: a ball about all its parts and the places they guard. \[m\]
-    ball: Vec<(Vector3<f64>, f64)>,
+    pub(crate) ball: Vec<(Vector3<f64>, f64)>,
     /// A ball in the root frame that no moving part ever leaves. \[m\]
     pub(crate) centre: Vector3<f64>,
     pub(crate) radius: f64,

@@ -157,6 +157,7 @@ impl World {
                 _ => moving[slots[b]].against.push(slots[a]),
             }
         }
+        moving_pairs.sort_by_key(|&(a, b): &(usize, usize)| (moving[a].body, moving[b].body));
         let mut scene_obstacles = Vec::new();
         for obstacle in obstacles {
             let solid = obstacle_solid(obstacle)?;
