@@ -10,6 +10,7 @@ use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::Setpoint;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 
+use super::station;
 use super::stats::Times;
 use crate::clock::Grid;
 
@@ -45,8 +46,8 @@ fn bare_loop(time: Duration) -> Times {
     }
 }
 
-/// One way from a thread that sends a setpoint each millisecond to one that polls for it, with
-/// nothing else done.
+/// One way from a thread that sends a setpoint each millisecond to one that waits for it as the
+/// lab's endpoint does, with nothing else done.
 pub(super) fn ping(
     root: &Path,
     time: Duration,
@@ -58,11 +59,13 @@ pub(super) fn ping(
         let receiving = scope.spawn(|| -> anyhow::Result<Times> {
             let receiver = Ipc::open("ping", Some(root))?.setpoint_receiver()?;
             let mut times = Times::default();
+            let _ = become_real_time(priority.saturating_sub(1), None);
+            let mut due_ns = now_ns();
             while !done.load(Ordering::Relaxed) {
-                if let Some(setpoint) = receiver.receive()? {
+                if let Some(setpoint) = station::wait(&receiver, due_ns)? {
                     times.record(now_ns().saturating_sub(setpoint.stamp_ns));
+                    due_ns = setpoint.deadline_ns;
                 }
-                std::hint::spin_loop();
             }
             Ok(times)
         });
@@ -84,7 +87,8 @@ fn send(root: &Path, time: Duration) -> anyhow::Result<()> {
     let end_ns = now_ns() + time.as_nanos() as u64;
     let mut setpoint = Setpoint::zeroed();
     while setpoint.stamp_ns < end_ns {
-        grid.wait();
+        let tick = grid.wait();
+        setpoint.deadline_ns = tick.due_ns + (tick.skipped + 1) * PERIOD_NS;
         setpoint.sequence += 1;
         setpoint.stamp_ns = now_ns();
         sender.send(&setpoint)?;

@@ -197,7 +197,8 @@ fn measure(
     let mut executor = stage.start(Part::Executor, "executor", options)?;
     let (root, done) = (stage.root(), AtomicBool::new(false));
     thread::scope(|scope| {
-        let endpoint = scope.spawn(|| station::run(arm, stage.robot(), &root, &done));
+        let endpoint =
+            scope.spawn(|| station::run(arm, stage.robot(), &root, below(args.priority), &done));
         let published = publish(args, arm, stage, &mut executor, time, random, sums);
         done.store(true, Ordering::Relaxed);
         let seen = endpoint.join().map_err(|_| anyhow::anyhow!("the endpoint's thread died"))??;
@@ -218,6 +219,11 @@ fn measure(
         }
         Ok(())
     })
+}
+
+/// The priority of what must not get in the executor's way.
+fn below(priority: u8) -> u8 {
+    priority.saturating_sub(1)
 }
 
 /// Publishes plans at moments that are drawn in advance, whatever became of the last one; the ids
@@ -292,7 +298,7 @@ fn figures(args: &Args, load: String, sums: &Sums) -> Figures {
                 Row { what: "executor: compute time", times: of_buckets(&sums.compute) },
                 row("executor: setpoint made after due", &sums.made_late),
                 row("bare iceoryx2 ping: one way", &sums.ping),
-                row("setpoint: executor to endpoint", &sums.transport),
+                row("setpoint: stamp to endpoint, with compute", &sums.transport),
                 row("setpoint: inter-arrival", &sums.inter_arrival),
                 row("publish to first new setpoint", &sums.swap),
             ])
@@ -308,7 +314,7 @@ fn page(figures: &Figures, sums: &Sums) -> String {
         ("executor: wake-up lateness", picture::of_histogram(&sums.wake)),
         ("executor: compute time", picture::of_histogram(&sums.compute)),
         ("bare sleep loop: wake-up lateness", picture::of_times(&sums.sleep)),
-        ("setpoint: executor to endpoint", picture::of_times(&sums.transport)),
+        ("setpoint: stamp to endpoint, with compute", picture::of_times(&sums.transport)),
         ("bare iceoryx2 ping: one way", picture::of_times(&sums.ping)),
         ("publish to first new setpoint", picture::of_times(&sums.swap)),
     ];
