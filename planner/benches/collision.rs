@@ -147,9 +147,9 @@ fn working_motion_free(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// All joints by 0.05 rad: a step of a transfer or a track.
+/// All joints by 0.02 rad: a step of a transfer.
 #[divan::bench]
-fn working_small_motion_free(bencher: Bencher<'_, '_>) {
+fn random_small_motion_free(bencher: Bencher<'_, '_>) {
     let s = &*SETTING;
     over(bencher, &s.random, |q| {
         let mut near = *q;

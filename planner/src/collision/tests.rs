@@ -388,3 +388,27 @@ fn the_floor_carries_the_robot_but_stops_the_arm() {
     let hit = world.stance_hit().unwrap();
     assert!(hit.link == "base_link" && hit.distance < 0.0, "{hit}");
 }
+
+#[test]
+fn capsules_stand_in_for_the_meshes_of_other_arms() {
+    let data =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/coverage-tasks");
+    if !data.exists() {
+        println!("skipped: {} is not there", data.display());
+        return;
+    }
+    for (file, base, tip) in
+        [("ur5.urdf", "base_link", "tool0"), ("panda.urdf", "panda_link0", "panda_link8")]
+    {
+        let robot = Robot::from_urdf_file(&data.join(file)).unwrap();
+        let arm = robot.arm(&ArmSpec { base: base.into(), tip: tip.into() }).unwrap();
+        let options = Options { fit_capsules: Some(0.05), ..Options::default() };
+        let tool = Tool { centre: [0.0, 0.0, 0.03], approach: [0.0, 0.0, 1.0], ..Tool::default() };
+        let world = World::new(&robot, &arm, &tool, &wall(500, 4), &[], &options).unwrap();
+        assert!(world.notes().len() >= 7, "{:?}", world.notes());
+        let mut rng = ChaCha8Rng::seed_from_u64(13);
+        let all: Vec<_> = (0..500).map(|_| random_configuration(&arm, &mut rng)).collect();
+        let free = agree(&world, &all, ToolContact::Forbidden);
+        assert!((100..480).contains(&free), "{file}: {free} of 500 free");
+    }
+}
