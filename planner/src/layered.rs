@@ -61,6 +61,9 @@ pub trait Moves: Sync {
     /// found.
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<Self::Path>>;
 
+    /// Whether the tool can be lifted off at a sample: without that no jump begins or ends there.
+    fn lifts(&self, at: &Sample) -> bool;
+
     /// An estimate of a jump's cost from that of its straight joint line, not above the truth.
     fn jump_estimate(&self, straight: f64) -> f64;
 }
@@ -90,7 +93,7 @@ const MAX_ROUNDS: usize = 100;
 /// depends on the sample.
 const MAX_JUMPS: usize = 3;
 /// Failed jumps into one layer after which it is left out.
-const MAX_FAILED_JUMPS: usize = 8;
+const MAX_FAILED_JUMPS: usize = 12;
 
 /// The cheapest path from `source` through one sample of each layer. A layer without samples, or
 /// into which no motion is found, is left out; `left_out` is called with it.
@@ -155,13 +158,16 @@ pub fn shortest<C: Cost, M: Moves>(
                     *jumps += usize::from(!edges.is_tracked(a, b));
                     edges.learn(a, b, motion.cost);
                     if *jumps >= MAX_JUMPS {
-                        edges.close_jumps();
+                        edges.close_jumps(|_, _| true);
                     }
                     made.insert(keys[p], motion);
                 }
                 None if edges.is_tracked(a, b) => edges.fall_back_to_jump(a, b),
                 None => {
                     edges.close(a, b);
+                    let lifts = |(l, s): (usize, usize)| moves.lifts(&layers[l][s]);
+                    let (from, to) = (keys[p].from.is_none_or(lifts), lifts(keys[p].to));
+                    edges.close_jumps(|row, column| (row == a && !from) || (column == b && !to));
                     let failed = &mut failed_jumps[keys[p].to.0];
                     *failed += 1;
                     if *failed > MAX_FAILED_JUMPS || edges.is_closed() {
@@ -404,12 +410,12 @@ impl Edges {
         self.estimate[at] = f32::INFINITY;
     }
 
-    /// Gives up all jumps that were not made.
-    fn close_jumps(&mut self) {
-        for (kind, estimate) in self.kind.iter_mut().zip(&mut self.estimate) {
-            if *kind == Kind::Jump {
+    /// Gives up the jumps between the samples (row, column) that `which` picks, but those made.
+    fn close_jumps(&mut self, which: impl Fn(usize, usize) -> bool) {
+        for (i, kind) in self.kind.iter_mut().enumerate() {
+            if *kind == Kind::Jump && which(i / self.width, i % self.width) {
                 *kind = Kind::Known;
-                *estimate = f32::INFINITY;
+                self.estimate[i] = f32::INFINITY;
             }
         }
     }
@@ -458,6 +464,9 @@ mod tests {
         fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
             let start = from.map_or([0.0; MAX_DOF], |s| s.q);
             Some(Motion { cost: self.jump_estimate(straight(&start, &to.q)), path: () })
+        }
+        fn lifts(&self, _: &Sample) -> bool {
+            true
         }
         fn jump_estimate(&self, straight: f64) -> f64 {
             2.0 + 1.5 * straight

@@ -117,6 +117,10 @@ impl<C: Cost> Moves for Mover<'_, C> {
         Some(Motion { cost, path: Leg { joints, line } })
     }
 
+    fn lifts(&self, at: &Sample) -> bool {
+        transfer::lift(self.cell, &at.q).is_some()
+    }
+
     fn jump_estimate(&self, straight: f64) -> f64 {
         self.lift + straight
     }

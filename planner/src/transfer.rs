@@ -55,12 +55,8 @@ pub fn jump(
 ) -> Option<Vec<JointVector>> {
     let options = Options::default();
     let to = nearest_turn(cell.arm, to, from);
-    let off = |q: &JointVector| match cell.world.is_free(q, ToolContact::Forbidden) {
-        true => Some(vec![*q]),
-        false => retract(cell.world, cell.arm, cell.tool, q, options.lift),
-    };
-    let mut path = off(from)?;
-    let mut down = off(&to)?;
+    let mut path = lift(cell, from)?;
+    let mut down = lift(cell, &to)?;
     down.reverse();
     let (above, goal) = (path.pop()?, down[0]);
     let across = plan(cell.world, cell.arm, &above, &goal, &options, seed)?;
@@ -72,6 +68,16 @@ pub fn jump(
         down[1..].iter().map(|q| -> JointVector { std::array::from_fn(|j| q[j] + turns[j]) }),
     );
     Some(path)
+}
+
+/// The way off the surface: none but `q` itself where the tool keeps its margin already, else
+/// [`retract`] by the default lift.
+#[must_use]
+pub fn lift(cell: Workcell<'_>, q: &JointVector) -> Option<Vec<JointVector>> {
+    match cell.world.is_free(q, ToolContact::Forbidden) {
+        true => Some(vec![*q]),
+        false => retract(cell.world, cell.arm, cell.tool, q, Options::default().lift),
+    }
 }
 
 /// Backs the tool off by `distance` \[m\], its orientation kept, from the contact at `q`:

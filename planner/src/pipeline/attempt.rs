@@ -129,6 +129,10 @@ impl Shop<'_> {
         }
         let mut patches = attempt.patches.clone();
         let mut visit = attempt.visit.clone();
+        // What was out of reach of every motion would only be tried in vain again.
+        for &patch in &attempt.sequence.dropped {
+            visit[patch] = None;
+        }
         for (patch, sample) in extra.into_iter().zip(reached).filter(|(_, s)| s.is_some()) {
             patches.push(patch);
             visit.push(sample);
