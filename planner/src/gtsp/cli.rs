@@ -56,7 +56,7 @@ pub enum Method {
 #[derive(Debug, thiserror::Error)]
 pub enum GtspCliError {
     /// The instance cannot be read.
-    #[error("{file}: {source}")]
+    #[error("cannot use {file}")]
     File {
         /// The file.
         file: PathBuf,
@@ -70,7 +70,7 @@ pub enum GtspCliError {
     #[error(transparent)]
     Solve(#[from] SolveError),
     /// An output cannot be written.
-    #[error("cannot write {file}: {source}")]
+    #[error("cannot write {file}")]
     Write {
         /// The file.
         file: PathBuf,
