@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 /// so that the straight line between two ends is a lower bound for every path between them.
 pub trait Cost: Send + Sync {
     /// The cost of moving each joint by `displacement` (absolute values, unused lanes 0).
-    /// [rad] or [m] in, the cost's own unit out.
+    /// \[rad\] or \[m\] in, the cost's own unit out.
     fn of(&self, displacement: &JointVector) -> f64;
 }
 
-/// Manipulation effort: the sum of all joint displacements (Eq. 1). [rad]
+/// Manipulation effort: the sum of all joint displacements (Eq. 1). \[rad\]
 #[derive(Clone, Copy, Debug)]
 pub struct Effort;
 
@@ -26,15 +26,15 @@ impl Cost for Effort {
 }
 
 /// Time to completion at bounded joint velocities: the slowest joint's time (Eq. 2, with a
-/// velocity for each joint). [s]
+/// velocity for each joint). \[s\]
 #[derive(Clone, Copy, Debug)]
 pub struct TaskTime {
-    /// One over each joint's velocity; 0 in unused lanes. [s/rad] or [s/m]
+    /// One over each joint's velocity; 0 in unused lanes. \[s/rad\] or \[s/m\]
     seconds_per_unit: JointVector,
 }
 
 impl TaskTime {
-    /// With the given velocity of each joint. [rad/s] or [m/s]
+    /// With the given velocity of each joint. \[rad/s\] or \[m/s\]
     #[must_use]
     pub fn new(velocity: &JointVector) -> Self {
         Self { seconds_per_unit: velocity.map(|v| if v > 0.0 { 1.0 / v } else { 0.0 }) }
@@ -74,7 +74,7 @@ pub enum CostKind {
 }
 
 /// The velocity of each joint: the robot's limits, or one `v_max` for all where that is lower
-/// or where it is asked for. Unused lanes are 0. [rad/s] or [m/s]
+/// or where it is asked for. Unused lanes are 0. \[rad/s\] or \[m/s\]
 #[must_use]
 pub fn velocities(arm: &Arm, v_max: Option<f64>) -> JointVector {
     let mut velocity = [0.0; MAX_DOF];

@@ -42,7 +42,7 @@ impl Default for FormulationConfig {
 pub struct Stop {
     /// The patch.
     pub patch: usize,
-    /// The pad's heading there. [rad]
+    /// The pad's heading there. \[rad\]
     pub heading: f64,
 }
 
@@ -57,7 +57,7 @@ pub enum FormulationError {
     Solve(#[from] SolveError),
 }
 
-/// Price of going between patches that no edge joins (Eq. 3's h): dearer than any whole tour. [m]
+/// Price of going between patches that no edge joins (Eq. 3's h): dearer than any whole tour. \[m\]
 /// or weighed [m and rad]
 const JUMP: f64 = 1e4;
 
@@ -109,7 +109,7 @@ pub fn pose(patches: &[Patch], tool: &Tool, stop: &Stop) -> Isometry3<f64> {
 }
 
 /// The weighed distance of two contact frames (Eq. 4); for a symmetric pad the smaller of the
-/// two turns. [m and rad, weighed]
+/// two turns. \[m and rad, weighed\]
 #[must_use]
 pub fn curvature(a: &Isometry3<f64>, b: &Isometry3<f64>, beta: f64, symmetric: bool) -> f64 {
     let between = a.inv_mul(b);

@@ -11,7 +11,7 @@ use crate::surface::{Surface, SurfacePoint};
 use crate::track::ToolPath;
 
 /// Turns of the pad from the direction of travel that are tried, the paper's own first: the long
-/// side across the travel. [°]
+/// side across the travel. \[°\]
 const TURNS: [f64; 6] = [0.0, 30.0, -30.0, 60.0, -60.0, 90.0];
 
 /// How the graph is built.
@@ -19,9 +19,9 @@ const TURNS: [f64; 6] = [0.0, 30.0, -30.0, 60.0, -60.0, 90.0];
 pub struct GraphConfig {
     /// Nearest neighbours of each patch that are tried (paper §V: 8).
     pub neighbours: usize,
-    /// Longest edge. [m] (paper §V: 10 cm)
+    /// Longest edge. \[m\] (paper §V: 10 cm)
     pub radius: f64,
-    /// Step of the surface line between two patches. [m]
+    /// Step of the surface line between two patches. \[m\]
     pub line_step: f64,
     /// Redundancy values that are tried before an edge is given up.
     pub edge_samples: usize,
@@ -42,17 +42,17 @@ pub struct Edge {
     pub b: usize,
     /// The surface line from `a`'s centre to `b`'s, both included, at least two points.
     pub line: Vec<SurfacePoint>,
-    /// Heading at `a` of a tool that travels from `a` to `b`. [rad]
+    /// Heading at `a` of a tool that travels from `a` to `b`. \[rad\]
     pub heading_a: f64,
-    /// Heading at `b` of a tool that travels from `a` to `b`. [rad]
+    /// Heading at `b` of a tool that travels from `a` to `b`. \[rad\]
     pub heading_b: f64,
     /// Turn of the pad from the direction of travel at which the edge can be followed: 0 where
-    /// that goes. [rad]
+    /// that goes. \[rad\]
     pub turn: f64,
 }
 
 impl Edge {
-    /// Straight distance between the two patches. [m]
+    /// Straight distance between the two patches. \[m\]
     #[must_use]
     pub fn chord(&self) -> f64 {
         (self.line[self.line.len() - 1].point - self.line[0].point).norm()
@@ -64,7 +64,7 @@ impl Edge {
         if patch == self.a { self.b } else { self.a }
     }
 
-    /// The pad's heading at one end when it leaves along the edge, its turn included. [rad]
+    /// The pad's heading at one end when it leaves along the edge, its turn included. \[rad\]
     #[must_use]
     pub fn leaving(&self, patch: usize) -> f64 {
         let back = std::f64::consts::PI;

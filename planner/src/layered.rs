@@ -9,7 +9,7 @@
 //! An estimate is the straight cost times the mean ratio of true to straight cost seen so far
 //! between the same two layers: the detour of the surface line is much the same for all samples.
 //! The search ends when no path's estimate is lower than the best path made by more than
-//! [`GAP`], and every motion of that path is proven free of collision between its joint vectors.
+//! `GAP`, and every motion of that path is proven free of collision between its joint vectors.
 
 use std::collections::{HashMap, HashSet};
 

@@ -14,9 +14,9 @@ use crate::transfer;
 /// A joint path into a stop.
 #[derive(Clone, Debug)]
 pub struct Leg {
-    /// Joint vectors from where the arm was to the stop's sample. [rad] or [m]
+    /// Joint vectors from where the arm was to the stop's sample. \[rad\] or \[m\]
     pub joints: Vec<JointVector>,
-    /// For each of them the planned pad centre while the pad is on the surface, root frame. [m]
+    /// For each of them the planned pad centre while the pad is on the surface, root frame. \[m\]
     pub line: Vec<Option<Point3<f64>>>,
 }
 
@@ -42,7 +42,7 @@ pub struct Mover<'a, C> {
     seed: u64,
 }
 
-/// What a jump adds to a tracked motion: each of these joints moves this far. [rad]
+/// What a jump adds to a tracked motion: each of these joints moves this far. \[rad\]
 const LIFT_JOINTS: usize = 4;
 const LIFT_ANGLE: f64 = 0.8;
 

@@ -30,11 +30,11 @@ pub struct Plan {
     pub fingerprint: u64,
     /// The arm's joints, base to tip.
     pub joints: Vec<String>,
-    /// The joints that the plan takes as fixed, in the URDF's order. [rad] or [m]
+    /// The joints that the plan takes as fixed, in the URDF's order. \[rad\] or \[m\]
     pub held: Vec<Held>,
     /// The tool that it was made for.
     pub tool: Tool,
-    /// The robot's root frame in the floor frame: x, y [m], yaw [rad].
+    /// The robot's root frame in the floor frame: x, y \[m\], yaw \[rad\].
     pub base: [f64; 3],
     /// How the order was found.
     pub method: Method,
@@ -44,9 +44,9 @@ pub struct Plan {
     pub seed: u64,
     /// The timed path.
     pub knots: Vec<PlanKnot>,
-    /// Centres of the patches in the root frame, by the index that the knots use. [m]
+    /// Centres of the patches in the root frame, by the index that the knots use. \[m\]
     pub patches: Vec<[f64; 3]>,
-    /// The scanned points that the plan is to sweep, in the root frame. [m]
+    /// The scanned points that the plan is to sweep, in the root frame. \[m\]
     pub surface: Vec<SurfaceSample>,
     /// For a plan that goes on from another one: where.
     pub continues: Option<Continues>,
@@ -57,14 +57,14 @@ pub struct Plan {
 pub struct Held {
     /// Its name in the URDF.
     pub name: String,
-    /// Where it stands. [rad] or [m]
+    /// Where it stands. \[rad\] or \[m\]
     pub position: f64,
 }
 
 /// A scanned point with what is known of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceSample {
-    /// Position in the root frame. [m]
+    /// Position in the root frame. \[m\]
     #[serde(rename = "p")]
     pub point: [f64; 3],
     /// Unit normal in the root frame.
@@ -78,12 +78,12 @@ pub struct SurfaceSample {
 /// One knot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanKnot {
-    /// Time since the plan's start. [ns]
+    /// Time since the plan's start. \[ns\]
     #[serde(rename = "t")]
     pub time_ns: u64,
-    /// Joint vector, continuous joints unwrapped along the plan. [rad] or [m]
+    /// Joint vector, continuous joints unwrapped along the plan. \[rad\] or \[m\]
     pub q: JointVector,
-    /// The planned pad centre in the root frame while the pad is on the surface. [m]
+    /// The planned pad centre in the root frame while the pad is on the surface. \[m\]
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub line: Option<[f64; 3]>,
     /// The patch that is reached in this knot.
@@ -178,13 +178,13 @@ impl Plan {
         Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * yaw)
     }
 
-    /// How long it takes. [s]
+    /// How long it takes. \[s\]
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.knots.last().map_or(0.0, |k| k.time_ns as f64 * 1e-9)
     }
 
-    /// The planned pad centre of each knot on the surface, root frame. [m]
+    /// The planned pad centre of each knot on the surface, root frame. \[m\]
     #[must_use]
     pub fn line(&self, knot: usize) -> Option<Point3<f64>> {
         self.knots.get(knot)?.line.map(Point3::from)

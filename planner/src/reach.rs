@@ -22,13 +22,13 @@ pub struct Workcell<'a> {
 /// One joint vector that puts the pad on a contact pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Joint vector. [rad] or [m]
+    /// Joint vector. \[rad\] or \[m\]
     pub q: JointVector,
     /// Branch of the inverse kinematics.
     pub branch: Branch,
-    /// Value of the redundancy parameter. [rad]
+    /// Value of the redundancy parameter. \[rad\]
     pub redundancy: f64,
-    /// Heading of the pad about the surface normal, from [`tangents`]' first axis. [rad]
+    /// Heading of the pad about the surface normal, from [`tangents`]' first axis. \[rad\]
     pub heading: f64,
 }
 
@@ -41,14 +41,14 @@ pub fn tangents(normal: &UnitVector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (first, normal.cross(&first))
 }
 
-/// The unit tangent at a heading. [rad]
+/// The unit tangent at a heading. \[rad\]
 #[must_use]
 pub fn direction(normal: &UnitVector3<f64>, heading: f64) -> Vector3<f64> {
     let (e1, e2) = tangents(normal);
     e1 * heading.cos() + e2 * heading.sin()
 }
 
-/// The heading of a direction, which is projected onto the tangent plane. [rad], (−π, π]
+/// The heading of a direction, which is projected onto the tangent plane. \[rad\], (−π, π]
 #[must_use]
 pub fn heading_of(normal: &UnitVector3<f64>, direction: &Vector3<f64>) -> f64 {
     let (e1, e2) = tangents(normal);
@@ -75,7 +75,7 @@ pub fn contact_pose(
 }
 
 /// Values of the redundancy parameter to try (paper §V): fewer than 10 around the middle of the
-/// range, more uniformly over it; one value 0 for an arm without redundancy. [rad]
+/// range, more uniformly over it; one value 0 for an arm without redundancy. \[rad\]
 #[must_use]
 pub fn redundancies(range: Option<(f64, f64)>, count: usize) -> Vec<f64> {
     let Some((low, high)) = range else { return vec![0.0] };

@@ -13,9 +13,9 @@ use crate::tool::Tool;
 /// The pose of the robot's root frame on the floor and the positions of joints outside the arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stance {
-    /// x, y [m] and yaw [rad] of the root frame in the floor frame.
+    /// x, y \[m\] and yaw \[rad\] of the root frame in the floor frame.
     pub base: [f64; 3],
-    /// Held joints by name, for instance the torso's height. [rad] or [m]
+    /// Held joints by name, for instance the torso's height. \[rad\] or \[m\]
     pub held: Vec<(String, f64)>,
 }
 
@@ -40,15 +40,15 @@ impl Stance {
 /// What the search for a stance tries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StanceSearch {
-    /// Distances of the root frame from the object's centre on the floor. [m]
+    /// Distances of the root frame from the object's centre on the floor. \[m\]
     pub distances: Vec<f64>,
     /// Directions around the object, evenly over a full turn.
     pub bearings: usize,
-    /// Yaw angles, 0 = the robot's x axis through the object's centre. [rad]
+    /// Yaw angles, 0 = the robot's x axis through the object's centre. \[rad\]
     pub yaws: Vec<f64>,
-    /// The joint that lifts the arm, if the robot has it, and the positions to try. [m]
+    /// The joint that lifts the arm, if the robot has it, and the positions to try. \[m\]
     pub lift: Option<(String, Vec<f64>)>,
-    /// Held joints that are given. [rad] or [m]
+    /// Held joints that are given. \[rad\] or \[m\]
     pub held: Vec<(String, f64)>,
     /// Most patches that a candidate is judged by.
     pub patches: usize,
@@ -73,7 +73,7 @@ impl Default for StanceSearch {
 
 /// A stance with the share of the patches' points that have inverse kinematics solutions inside
 /// the margined limits, collisions not yet looked at. A patch counts in full if it has solutions
-/// at [`ROBUST`] redundancy values: one alone hardly ever leads on to the next patch.
+/// at three redundancy values: one alone hardly ever leads on to the next patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// The stance.
@@ -86,7 +86,7 @@ pub struct Candidate {
 const REDUNDANCIES: usize = 12;
 /// How many of them must have a solution for a patch to count in full.
 const ROBUST: usize = 3;
-/// Space that the standing body keeps from the scan. [m]
+/// Space that the standing body keeps from the scan. \[m\]
 const BODY_SPACE: f64 = 0.03;
 
 /// Stances on a ring of candidates around the object, best first, at most

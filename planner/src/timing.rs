@@ -5,9 +5,9 @@ use nullsweep_robot::{JointVector, MAX_DOF};
 /// The time that each knot is reached, from 0, when every straight segment runs as fast as its
 /// slowest joint allows and all joints arrive together (Eq. 2): the joint path stays the chord
 /// that was checked. Rounded up to whole nanoseconds a segment, at least 1 ns, so that times rise
-/// strictly and no joint exceeds its velocity. [ns]
+/// strictly and no joint exceeds its velocity. \[ns\]
 ///
-/// `velocity` holds each joint's velocity, 0 in unused lanes. [rad/s] or [m/s]
+/// `velocity` holds each joint's velocity, 0 in unused lanes. \[rad/s\] or \[m/s\]
 #[must_use]
 pub fn bang_bang(path: &[JointVector], velocity: &JointVector) -> Vec<u64> {
     let mut times = Vec::with_capacity(path.len());
@@ -21,7 +21,7 @@ pub fn bang_bang(path: &[JointVector], velocity: &JointVector) -> Vec<u64> {
     times
 }
 
-/// The least time from `a` to `b`. [ns]
+/// The least time from `a` to `b`. \[ns\]
 #[must_use]
 pub fn segment_ns(a: &JointVector, b: &JointVector, velocity: &JointVector) -> u64 {
     let mut seconds = 0.0f64;

@@ -13,25 +13,25 @@ use serde::{Deserialize, Serialize};
 pub struct Tool {
     /// For people.
     pub name: String,
-    /// Long side of the pad, across the travel, the contact frame's y. [m]
+    /// Long side of the pad, across the travel, the contact frame's y. \[m\]
     pub length: f64,
-    /// Short side of the pad, along the travel, the contact frame's x. [m]
+    /// Short side of the pad, along the travel, the contact frame's x. \[m\]
     pub width: f64,
-    /// Height of the pad's body, from the surface back towards the arm. [m]
+    /// Height of the pad's body, from the surface back towards the arm. \[m\]
     pub thickness: f64,
-    /// Centre of the pad in the arm's tip frame. [m]
+    /// Centre of the pad in the arm's tip frame. \[m\]
     pub centre: [f64; 3],
     /// The tip frame's axis that points into the surface.
     pub approach: [f64; 3],
     /// The tip frame's axis along the pad's long side.
     pub across: [f64; 3],
-    /// Distance kept between pad centre and surface, along the normal. [m]
+    /// Distance kept between pad centre and surface, along the normal. \[m\]
     pub stand_off: f64,
     /// Whether a heading and its opposite are the same contact.
     pub symmetric: bool,
-    /// A point is swept within this distance of the pad's plane. [m]
+    /// A point is swept within this distance of the pad's plane. \[m\]
     pub reach_normal: f64,
-    /// A point is swept if its normal is within this angle of the pad's. [rad]
+    /// A point is swept if its normal is within this angle of the pad's. \[rad\]
     pub reach_angle: f64,
 }
 

@@ -29,9 +29,9 @@ struct Station {
 /// Joint vectors and pad centres along a tool path, both ends included.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
-    /// Joint vectors, continuous joints unwrapped. [rad] or [m]
+    /// Joint vectors, continuous joints unwrapped. \[rad\] or \[m\]
     pub joints: Vec<JointVector>,
-    /// The planned pad centre of each joint vector, root frame. [m]
+    /// The planned pad centre of each joint vector, root frame. \[m\]
     pub line: Vec<Point3<f64>>,
 }
 
@@ -48,11 +48,11 @@ pub enum TrackFailure {
     Elsewhere,
 }
 
-/// Farthest that the pad may leave the planned line between two joint vectors. [m]
+/// Farthest that the pad may leave the planned line between two joint vectors. \[m\]
 const LINE_TOLERANCE: f64 = 1e-4;
 /// Most times that a step of the line is halved to stay within [`LINE_TOLERANCE`].
 const MAX_HALVINGS: u32 = 5;
-/// A joint that moves further over one step of the line has changed its branch. [rad]
+/// A joint that moves further over one step of the line has changed its branch. \[rad\]
 const MAX_STEP: f64 = 0.8;
 
 impl ToolPath {
@@ -225,14 +225,14 @@ impl Run<'_> {
     }
 }
 
-/// The angle from a station's line direction to a heading, about the normal. [rad]
+/// The angle from a station's line direction to a heading, about the normal. \[rad\]
 fn turn(station: &Station, heading: f64) -> f64 {
     let d = direction(&station.normal, heading);
     let t = station.travel;
     station.normal.cross(&t).dot(&d).atan2(t.dot(&d))
 }
 
-/// The angle in (−π, π]. [rad]
+/// The angle in (−π, π]. \[rad\]
 #[must_use]
 pub(crate) fn wrap(angle: f64) -> f64 {
     angle - (angle / std::f64::consts::TAU).round() * std::f64::consts::TAU

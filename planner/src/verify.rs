@@ -46,12 +46,12 @@ pub struct Verification {
     pub violations: Vec<Violation>,
     /// Joint vectors at which collisions were looked for.
     pub collision_checks: usize,
-    /// Farthest that the pad centre leaves the planned line between knots. [m]
+    /// Farthest that the pad centre leaves the planned line between knots. \[m\]
     pub line_deviation_max_m: f64,
     /// 95th percentile of the pad centre's distance from the scanned surface, less the
-    /// stand-off, over the motion on the surface. [m]
+    /// stand-off, over the motion on the surface. \[m\]
     pub scan_distance_p95_m: f64,
-    /// The largest of those. [m]
+    /// The largest of those. \[m\]
     pub scan_distance_max_m: f64,
     /// Share of all scanned points that are swept.
     pub coverage_all: f64,
@@ -62,11 +62,11 @@ pub struct Verification {
     pub swept: Vec<bool>,
 }
 
-/// Joints move at most this far between two looks at collisions. [rad] or [m]
+/// Joints move at most this far between two looks at collisions. \[rad\] or \[m\]
 const COLLISION_STEP: f64 = 0.02;
-/// How far the pad is lifted off the surface before it must keep its margin, with some slack. [m]
+/// How far the pad is lifted off the surface before it must keep its margin, with some slack. \[m\]
 const LIFT: f64 = 0.052;
-/// Joints move at most this far between two looks at the pad. [rad] or [m]
+/// Joints move at most this far between two looks at the pad. \[rad\] or \[m\]
 const PAD_STEP: f64 = 0.01;
 
 /// Checks limits, times and collisions, and measures line, distance and swept coverage. `arm`

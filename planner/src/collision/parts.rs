@@ -21,7 +21,7 @@ pub(crate) struct Part {
     pub(crate) is_pad: bool,
 }
 
-/// The shape of a part about its origin; axes along z. [m]
+/// The shape of a part about its origin; axes along z. \[m\]
 #[derive(Clone, Debug)]
 pub(crate) enum PartShape {
     Box {
@@ -42,7 +42,7 @@ pub(crate) enum PartShape {
     Hull(Vec<Point3<f64>>),
 }
 
-/// Shortest distance between two joints that gets a capsule instead of a ball. [m]
+/// Shortest distance between two joints that gets a capsule instead of a ball. \[m\]
 const SHORT: f64 = 1e-3;
 
 impl Part {

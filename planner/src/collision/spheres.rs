@@ -4,7 +4,7 @@ use super::frame::Frame;
 use super::solid::Solid;
 use nalgebra::Vector3;
 
-/// One sphere of a tree in preorder. [m]
+/// One sphere of a tree in preorder. \[m\]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sphere {
     pub(crate) centre: Vector3<f64>,
@@ -20,7 +20,7 @@ pub(crate) struct SphereTree {
 }
 
 /// Largest width of a leaf: about what the distance grid can tell apart, and small enough that few
-/// scan points have to be looked at for each. [m]
+/// scan points have to be looked at for each. \[m\]
 const LEAF: f64 = 0.05;
 
 impl SphereTree {
@@ -73,13 +73,13 @@ impl SphereTree {
     }
 
     /// Upper bound of the distance of any covered point from the line through the origin of the
-    /// parent's frame along the unit vector `axis`. [m]
+    /// parent's frame along the unit vector `axis`. \[m\]
     pub(crate) fn reach_from_axis(&self, axis: &Vector3<f64>) -> f64 {
         let beside = |c: &Vector3<f64>| (c - axis * axis.dot(c)).norm();
         self.leaves().map(|s| beside(&s.centre) + s.radius).fold(0.0, f64::max)
     }
 
-    /// Upper bound of the distance of any covered point from `origin`, in the parent's frame. [m]
+    /// Upper bound of the distance of any covered point from `origin`, in the parent's frame. \[m\]
     pub(crate) fn reach_from(&self, origin: &Vector3<f64>) -> f64 {
         self.leaves().map(|s| (s.centre - origin).norm() + s.radius).fold(0.0, f64::max)
     }

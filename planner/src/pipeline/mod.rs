@@ -36,11 +36,11 @@ pub struct Job {
     pub tool: Tool,
     /// Where the robot stands.
     pub stance: StanceChoice,
-    /// Points that were scanned but are not to be swept, in the floor frame. [m]
+    /// Points that were scanned but are not to be swept, in the floor frame. \[m\]
     pub surroundings: Vec<Point3<f64>>,
     /// Solid things besides the scan, posed in the floor frame.
     pub obstacles: Vec<Obstacle>,
-    /// Where the arm is; `None`: its home posture. [rad] or [m]
+    /// Where the arm is; `None`: its home posture. \[rad\] or \[m\]
     pub start: Option<JointVector>,
     /// A plan that this one goes on from.
     pub after: Option<After>,
@@ -50,7 +50,7 @@ pub struct Job {
     pub cost: CostKind,
     /// Samples of the inverse kinematics at each tool pose, 1…
     pub ik_samples: usize,
-    /// One velocity for all joints; `None`: the robot's limits. [rad/s]
+    /// One velocity for all joints; `None`: the robot's limits. \[rad/s\]
     pub v_max: Option<f64>,
     /// Patch extraction.
     pub patches: PatchConfig,
@@ -103,19 +103,19 @@ pub struct Figures {
     pub edges: usize,
     /// Connected components of the graph.
     pub components: usize,
-    /// x, y [m] and yaw [rad] of the robot's root frame in the floor frame.
+    /// x, y \[m\] and yaw \[rad\] of the robot's root frame in the floor frame.
     pub base: [f64; 3],
-    /// Held joints that the stance sets. [rad] or [m]
+    /// Held joints that the stance sets. \[rad\] or \[m\]
     pub held: BTreeMap<String, f64>,
     /// Samples of the inverse kinematics that the layered graph had.
     pub ik_samples_total: usize,
-    /// Sum of all joint displacements. [rad]
+    /// Sum of all joint displacements. \[rad\]
     pub effort_rad: f64,
-    /// Duration of the plan. [s]
+    /// Duration of the plan. \[s\]
     pub task_time_s: f64,
-    /// Way of the pad on the surface. [m]
+    /// Way of the pad on the surface. \[m\]
     pub distance_m: f64,
-    /// Way of the pad through free space. [m]
+    /// Way of the pad through free space. \[m\]
     pub transfer_m: f64,
     /// Seconds that each stage took.
     pub calc_time_s: BTreeMap<String, f64>,
@@ -380,7 +380,7 @@ fn leave_out_swept(reached: &mut [Option<Sample>], patches: &[Patch], already: &
     }
 }
 
-/// Way of the pad's centre on the surface or off it. [m]
+/// Way of the pad's centre on the surface or off it. \[m\]
 fn way(plan: &Plan, arm: &Arm, on_surface: bool) -> f64 {
     let contact: Isometry3<f64> = plan.tool.contact_in_tip();
     let centre = |q: &JointVector| Point3::from((arm.tip_pose(q) * contact).translation.vector);

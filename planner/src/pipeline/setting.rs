@@ -89,7 +89,7 @@ impl Setting {
     }
 
     /// Points of reached patches, each weighed by the edges that lead on from its patch, up to
-    /// [`WELL_JOINED`]; `None` where body or start posture collide, or nothing is reached.
+    /// `WELL_JOINED`; `None` where body or start posture collide, or nothing is reached.
     fn score(&self, job: &Job) -> Option<usize> {
         start(job, &self.arm, &self.world).ok()?;
         if self.world.stance_hit().is_some() {
