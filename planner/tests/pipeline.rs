@@ -1,0 +1,98 @@
+//! The whole way from a simulated scan to a plan file.
+
+use nullsweep_planner::collision::{Obstacle, Options};
+use nullsweep_planner::cost::CostKind;
+use nullsweep_planner::formulation::{FormulationConfig, Method};
+use nullsweep_planner::graph::GraphConfig;
+use nullsweep_planner::patches::PatchConfig;
+use nullsweep_planner::pipeline::{After, Job, Outcome, StanceChoice, run};
+use nullsweep_planner::plan::{Plan, PlanError};
+use nullsweep_planner::progress::Silent;
+use nullsweep_planner::scan::{CleanConfig, Placement, Region, clean_region, place};
+use nullsweep_planner::simulate;
+use nullsweep_planner::stance::Stance;
+use nullsweep_planner::tool::Tool;
+use nullsweep_robot::{ArmSpec, Robot, Side};
+
+fn seat() -> Region {
+    let view = simulate::chair(1);
+    let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
+    clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default())
+        .expect("the seat is there")
+}
+
+fn job(seat: &Region, method: Method, cost: CostKind) -> Job {
+    let held = vec![("torso_lift_joint".to_owned(), 0.1)];
+    Job {
+        arm: ArmSpec::pr2(Side::Right),
+        tool: Tool::default(),
+        stance: StanceChoice::Given(Stance { base: [-0.04, 0.574, 5.607], held }),
+        surroundings: seat.surroundings.clone(),
+        obstacles: vec![Obstacle::floor(nalgebra::Isometry3::identity())],
+        start: None,
+        after: None,
+        method,
+        cost,
+        ik_samples: 30,
+        v_max: None,
+        patches: PatchConfig::default(),
+        graph: GraphConfig::default(),
+        formulation: FormulationConfig::default(),
+        refinements: 1,
+        collision: Options::default(),
+        seed: 1,
+    }
+}
+
+fn plan_on(threads: usize, seat: &Region, job: &Job) -> Outcome {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| run(&Robot::pr2(), &seat.surface, job, &Silent))
+        .expect("the seat can be planned")
+}
+
+fn check(outcome: &Outcome) {
+    let v = &outcome.figures.verification;
+    assert!(v.violations.is_empty(), "{:?}", v.violations);
+    assert!(v.coverage_reachable > 0.95, "reachable points: {}", v.coverage_reachable);
+    assert!(v.line_deviation_max_m < 2e-4, "line: {}", v.line_deviation_max_m);
+    assert!(v.scan_distance_p95_m < 0.006, "scan: {}", v.scan_distance_p95_m);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_plan_whatever_the_number_of_threads() {
+    let seat = seat();
+    let job = job(&seat, Method::Curvature, CostKind::Time);
+    let (one, two) = (plan_on(1, &seat, &job), plan_on(2, &seat, &job));
+    check(&one);
+    assert_eq!(one.plan.digest(), two.plan.digest());
+    assert_eq!(one.plan, two.plan);
+}
+
+#[test]
+fn a_plan_goes_on_from_a_knot_and_survives_its_file() {
+    let seat = seat();
+    let first = plan_on(2, &seat, &job(&seat, Method::Tsp, CostKind::Effort));
+    check(&first);
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.json");
+    first.plan.write(&path).expect("written");
+    let plan = Plan::read(&path).expect("read");
+    assert_eq!(plan, first.plan);
+
+    let knot = plan.knots.len() / 3;
+    let (start, digest) = (plan.knots[knot].q, plan.digest());
+    let after = Some(After { plan, knot, again: false });
+    let second =
+        plan_on(2, &seat, &Job { after, ..job(&seat, Method::Curvature, CostKind::Effort) });
+    check(&second);
+    assert_eq!(second.plan.knots[0].q, start);
+    assert_eq!(
+        second.plan.continues.as_ref().map(|c| (c.digest, c.knot)),
+        Some((digest, knot as u32))
+    );
+    assert!(second.plan.knots.len() < first.plan.knots.len(), "only what is left is swept");
+
+    std::fs::write(&path, "{\"format\": 1}").expect("written");
+    assert!(matches!(Plan::read(&path), Err(PlanError::Parse { .. })));
+}
