@@ -28,6 +28,8 @@ pub enum Fidelity {
 pub struct Behaviour {
     /// What stands behind the setpoints.
     pub fidelity: Fidelity,
+    /// For the mechanism, see [`Mechanism::with_payload`]. \[N·m\]
+    pub payload: f64,
     /// What the judge allows; its `session_timeout_ns` is also the endpoint's own watchdog.
     pub rules: Rules,
     /// Faults to play.
@@ -88,7 +90,9 @@ impl Endpoint {
     ) -> Result<Self, UnknownMechanism> {
         let plant: Box<dyn Plant> = match behaviour.fidelity {
             Fidelity::Servo => Box::new(Servo::new(arm, initial, now_ns)),
-            Fidelity::Mechanism => Box::new(Mechanism::new(arm, initial, now_ns)?),
+            Fidelity::Mechanism => {
+                Box::new(Mechanism::new(arm, initial, now_ns)?.with_payload(behaviour.payload))
+            }
         };
         Ok(Self {
             dof: arm.dof(),

@@ -20,6 +20,8 @@ const SUBSTEPS: u32 = 4;
 /// Counts of each motor's encoder in one turn.
 const COUNTS: f64 = 1200.0;
 const JOINTS: usize = 7;
+/// The joint that carries most of a weight in the hand.
+const LIFT: usize = 1;
 /// Joints that share two motors.
 const FLEX: usize = 5;
 const ROLL: usize = 6;
@@ -96,6 +98,8 @@ pub struct Mechanism {
     /// Integral shares of the efforts. \[N·m\]
     integrals: JointVector,
     enabled: bool,
+    /// What the counterbalance does not carry, on the shoulder lift. \[N·m\]
+    payload: f64,
 }
 
 impl Mechanism {
@@ -121,9 +125,18 @@ impl Mechanism {
             reached_ns: now_ns,
             integrals: zero,
             enabled: true,
+            payload: 0.0,
         };
         mechanism.measured = mechanism.encoders();
         Ok(mechanism)
+    }
+
+    /// The same arm with a weight in its hand that the counterbalance does not carry: a constant
+    /// effort on the shoulder lift. \[N·m\]
+    #[must_use]
+    pub fn with_payload(mut self, payload: f64) -> Self {
+        self.payload = payload;
+        self
     }
 
     /// One period: read encoders, control, bound, command the motors, move.
@@ -149,7 +162,8 @@ impl Mechanism {
         for _ in 0..SUBSTEPS {
             for j in 0..JOINTS {
                 // Damping taken at the end of the step, so that it cannot overshoot.
-                let impulse = self.velocities[j] + self.efforts[j] * dt / ARM[j].inertia;
+                let weight = if j == LIFT { self.payload } else { 0.0 };
+                let impulse = self.velocities[j] + (self.efforts[j] + weight) * dt / ARM[j].inertia;
                 self.velocities[j] = impulse / (1.0 + ARM[j].damping * dt / ARM[j].inertia);
                 self.positions[j] += self.velocities[j] * dt;
             }
@@ -394,6 +408,17 @@ mod tests {
         let here = m.measured;
         drive(&mut m, 3000, 500, |_| here);
         assert!((m.positions[0] - here[0]).abs() < 2e-3);
+    }
+
+    #[test]
+    fn a_weight_in_the_hand_is_held_and_sinks_without_motors() {
+        let home = arm().home();
+        let mut m = mechanism().with_payload(2.0);
+        drive(&mut m, 0, 4000, |_| home);
+        assert!((m.positions[LIFT] - home[LIFT]).abs() < 1e-3, "{}", m.positions[LIFT]);
+        m.release();
+        m.advance(5000 * MS);
+        assert!(m.positions[LIFT] > home[LIFT] + 0.05, "{}", m.positions[LIFT]);
     }
 
     #[test]

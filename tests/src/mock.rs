@@ -49,6 +49,9 @@ struct Args {
     /// How true to a robot the arm is
     #[arg(long, value_enum, default_value_t)]
     fidelity: Fidelity,
+    /// With --fidelity mechanism: effort on the shoulder lift of a weight in the hand, in N·m
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_name = "NM")]
+    payload: f64,
     /// End after so many seconds
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -130,7 +133,12 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
 
     let rules =
         Rules { session_timeout_ns: args.timeout.saturating_mul(1_000_000), ..Rules::default() };
-    let behaviour = Behaviour { fidelity: args.fidelity, rules, faults: args.fault.clone() };
+    let behaviour = Behaviour {
+        fidelity: args.fidelity,
+        payload: args.payload,
+        rules,
+        faults: args.fault.clone(),
+    };
     let start_ns = now_ns();
     let mut endpoint = Endpoint::new(&arm, initial, behaviour, start_ns)?;
     let mut recorder = Recorder::new(args.record_every.max(1) * 1_000_000);
