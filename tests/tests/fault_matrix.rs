@@ -139,3 +139,21 @@ fn every_fault_in_every_mode_with_a_servo() {
 fn every_fault_in_every_mode_with_a_mechanism() {
     matrix(Fidelity::Mechanism);
 }
+
+#[test]
+fn a_weight_does_not_sink_while_a_past_halt_is_latched() {
+    let arm = right_arm();
+    let behaviour =
+        Behaviour { fidelity: Fidelity::Mechanism, payload: 2.0, ..Behaviour::default() };
+    let mut system = Loopback::new(&arm, behaviour).expect("a PR2 arm");
+    system.run(3000);
+    let now = system.now_ns();
+    system.endpoint.play(FaultKind::Halt, Some(Duration::from_millis(200)), now);
+    system.run(400);
+    assert_eq!(system.snapshot().mode, Mode::Fault);
+    let before = *system.endpoint.positions();
+    system.run(5000);
+    let after = *system.endpoint.positions();
+    // The motors are on again: what the arm sank by when they were off is all it may sink.
+    assert!((after[1] - before[1]).abs() < 0.01, "it sank by {} rad", after[1] - before[1]);
+}

@@ -96,6 +96,12 @@ impl Watch {
         }
     }
 
+    /// Whether the endpoint follows no setpoint now, by its own word.
+    fn is_limp(&self) -> bool {
+        let timeout = |m: Measured| m.status & status::SETPOINT_TIMEOUT != 0;
+        self.endpoint().is_some() || self.newest.is_some_and(timeout)
+    }
+
     /// Counts cycles in windows; whether the mean over all windows is too low.
     fn rate_is_low(&mut self, now_ns: u64, guard: &Guard) -> bool {
         if self.window_start_ns == 0 {
@@ -214,9 +220,9 @@ impl State {
 
     fn follow_if_limp(&mut self, guard: &Guard) {
         let limp = match self.mode {
-            Mode::Fault => {
-                matches!(self.fault, Fault::Halted | Fault::NotCalibrated | Fault::Endpoint)
-            }
+            // A fault stays latched when its cause is gone: with the motors on again the command
+            // must stand, or a loaded arm sinks after its own sag.
+            Mode::Fault => self.watch.is_limp(),
             _ => self.is_off(),
         };
         if limp && let Some(measured) = self.watch.newest {
