@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -134,19 +134,29 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
     let recorder = recorder(config, tape.as_ref())?;
     let done = AtomicBool::new(false);
     let down = AtomicBool::new(false);
+    let open_ports = AtomicU32::new(0);
     thread::scope(|scope| {
         let worker = spawn(scope, "worker", || {
             let ipc = open(config)?;
             let worker = Worker::open(&ipc, slots.clone(), rules, recorder)?;
+            open_ports.fetch_add(1, Ordering::Release);
             worker.run(&done);
             Ok(())
         })?;
         let service = spawn(scope, "service", || {
             let ipc = open(config)?;
             let service = Service::open(&ipc, slots.clone(), arm.dof())?;
+            open_ports.fetch_add(1, Ordering::Release);
             service.run(&done);
             Ok(())
         })?;
+        // The loop comes last: whoever sees it hold can publish plans and command it.
+        while open_ports.load(Ordering::Acquire) < 2
+            && !worker.is_finished()
+            && !service.is_finished()
+        {
+            thread::sleep(Duration::from_millis(1));
+        }
         let looping = spawn(scope, "loop", || {
             // Before the first port, so that all their blocks are the pool's.
             rt::enter_pool();
