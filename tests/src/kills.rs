@@ -11,7 +11,6 @@ use std::time::Duration;
 
 use anyhow::{Context, bail, ensure};
 use clap::Parser;
-use nullsweep_ipc_types::ports::Ipc;
 use nullsweep_ipc_types::{CommandKind, EventKind, Mode, PlanId};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -20,8 +19,11 @@ use serde_json::Value;
 
 use crate::parts;
 use crate::stage::{Part, Process, Stage};
-use crate::witness::{PATIENCE, Witness};
+use crate::system::{System, start_executor, start_mock};
+use crate::witness::PATIENCE;
 
+/// Mock and executor run as they come.
+const NO_OPTIONS: [&str; 0] = [];
 /// Longest time from the start of a motion to the kill. \[ms\]
 const LONGEST_MS: u64 = 1500;
 
@@ -50,10 +52,7 @@ enum Victim {
 /// The running system.
 struct Lab<'a> {
     stage: &'a Stage,
-    ipc: Ipc,
-    witness: Witness,
-    mock: Process,
-    executor: Process,
+    system: System,
     /// Counts starts, to tell output files apart.
     starts: usize,
     violations: u64,
@@ -99,7 +98,7 @@ fn kill_all(args: &Args, stage: &Stage) -> anyhow::Result<()> {
         let victim = *victims.choose(&mut random).context("somebody is left")?;
         let delay = Duration::from_millis(random.random_range(0..LONGEST_MS));
         lab.kill(victim, delay).with_context(|| {
-            format!("kill {done} ({victim:?} after {delay:?}): {}", lab.witness)
+            format!("kill {done} ({victim:?} after {delay:?}): {}", lab.system.witness)
         })?;
         done += 1;
         if let Some(count) = left.get_mut(&victim) {
@@ -125,12 +124,8 @@ fn kill_all(args: &Args, stage: &Stage) -> anyhow::Result<()> {
 
 impl<'a> Lab<'a> {
     fn start(stage: &'a Stage) -> anyhow::Result<Self> {
-        let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
-        let mut witness = Witness::open(&ipc)?;
-        let mock = start_mock(stage, 0, &[])?;
-        let executor = start_executor(stage, 0)?;
-        witness.ready(&ipc)?;
-        Ok(Self { stage, ipc, witness, mock, executor, starts: 1, violations: 0, timeouts: 0 })
+        let system = System::start(stage, NO_OPTIONS, NO_OPTIONS)?;
+        Ok(Self { stage, system, starts: 1, violations: 0, timeouts: 0 })
     }
 
     /// One motion from where the arm is, one kill in it, and everything whole again.
@@ -142,28 +137,30 @@ impl<'a> Lab<'a> {
         match victim {
             Victim::Planner => {
                 planner.kill()?;
-                let end = self.witness.end(plan)?;
+                let end = self.system.witness.end(plan)?;
                 ensure!(end.kind == EventKind::Finished.wire(), "the plan did not run to its end");
-                self.witness.mode(Mode::Hold)?;
+                self.system.witness.mode(Mode::Hold)?;
             }
             Victim::Executor => {
-                self.executor.kill()?;
+                self.system.executor.kill()?;
                 self.starts += 1;
-                self.executor = start_executor(self.stage, self.starts)?;
-                let held = self.witness.ready(&self.ipc)?;
+                let name = format!("executor-{}", self.starts);
+                self.system.executor = start_executor(self.stage, &name, NO_OPTIONS)?;
+                let held = self.system.witness.mode(Mode::Hold)?;
                 ensure!(held.plan == PlanId::NONE, "a plan of before the restart was started");
             }
             Victim::Mock => {
-                self.mock.kill()?;
+                self.system.mock.kill()?;
                 // The plan may have been over by then; else the loss of the arm ends it.
-                self.witness.end(plan)?;
-                let lost = self.witness.mode(Mode::Fault)?;
+                self.system.witness.end(plan)?;
+                let lost = self.system.witness.mode(Mode::Fault)?;
                 // The arm is where it was last measured.
                 let at: Vec<_> =
                     lost.measured[..lost.joint_count as usize].iter().map(f64::to_string).collect();
                 self.starts += 1;
                 let initial = format!("--initial={}", at.join(","));
-                self.mock = start_mock(self.stage, self.starts, &[&initial])?;
+                let name = format!("mock-{}", self.starts);
+                self.system.mock = start_mock(self.stage, &name, [initial])?;
                 self.reset()?;
             }
         }
@@ -182,9 +179,9 @@ impl<'a> Lab<'a> {
     /// Resets a latched fault, again until its cause is gone.
     fn reset(&mut self) -> anyhow::Result<()> {
         for _ in 0..200 {
-            self.witness.command(CommandKind::Reset, 0.0)?;
+            self.system.witness.command(CommandKind::Reset, 0.0)?;
             thread::sleep(Duration::from_millis(20));
-            let telemetry = self.witness.see("telemetry", |_| true)?;
+            let telemetry = self.system.witness.see("telemetry", |_| true)?;
             if telemetry.mode == Mode::Hold.wire() {
                 return Ok(());
             }
@@ -193,7 +190,7 @@ impl<'a> Lab<'a> {
     }
 
     fn running(&mut self) -> anyhow::Result<PlanId> {
-        Ok(self.witness.see("a plan in motion", |t| t.plan.is_some())?.plan)
+        Ok(self.system.witness.see("a plan in motion", |t| t.plan.is_some())?.plan)
     }
 
     fn publish(&mut self, options: &[&str]) -> anyhow::Result<Process> {
@@ -204,10 +201,7 @@ impl<'a> Lab<'a> {
 
     /// Ends the mock and adds up what it found.
     fn count_verdict(&mut self) -> anyhow::Result<()> {
-        self.executor.terminate(PATIENCE)?;
-        self.mock.terminate(PATIENCE)?;
-        let text = std::fs::read(self.stage.file("mock.json"))?;
-        let found: Value = serde_json::from_slice(&text)?;
+        let found: Value = self.system.end(self.stage)?;
         self.violations += found["violations"].as_u64().context("no count of violations")?;
         self.timeouts += found["endpoint"]["timeouts"].as_u64().unwrap_or(0);
         for violation in found["verdict"]["first"].as_array().into_iter().flatten() {
@@ -215,17 +209,4 @@ impl<'a> Lab<'a> {
         }
         Ok(())
     }
-}
-
-fn start_mock(stage: &Stage, number: usize, more: &[&str]) -> anyhow::Result<Process> {
-    let mut args = stage.place().to_vec();
-    args.extend(["--json".into(), stage.file("mock.json").into()]);
-    args.extend(more.iter().map(OsString::from));
-    Ok(stage.start(Part::Mock, &format!("mock-{number}"), args)?)
-}
-
-fn start_executor(stage: &Stage, number: usize) -> anyhow::Result<Process> {
-    let mut args: Vec<OsString> = vec!["run".into()];
-    args.extend(stage.place());
-    Ok(stage.start(Part::Executor, &format!("executor-{number}"), args)?)
 }

@@ -4,7 +4,8 @@
 //! * [`mock`]: a simulated arm as a process, made of an [`endpoint`] (setpoints and a time in,
 //!   states out), a [`plant`] (a joint [`servo`], or the PR2's [`mechanism`]), the [`judge`] of
 //!   every setpoint, and [`fault`]s on request.
-//! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all.
+//! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all;
+//!   [`system`]: mock and executor on a stage, from their start to the verdict.
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
 //! * [`witness`]: watches an executor from outside.
 //! * [`latency`]: the latency lab; [`kills`]: the killing lab; [`loopback`]: executor and endpoint
@@ -29,4 +30,5 @@ pub mod record;
 pub mod servo;
 pub mod sketch;
 pub mod stage;
+pub mod system;
 pub mod witness;

@@ -200,6 +200,14 @@ impl Process {
     pub fn stderr(&self) -> String {
         read(&self.stderr)
     }
+
+    /// The last lines of what it wrote to standard error so far.
+    #[must_use]
+    pub fn last_words(&self) -> String {
+        let text = self.stderr();
+        let lines: Vec<_> = text.trim_end().lines().collect();
+        lines[lines.len().saturating_sub(8)..].join("\n  ")
+    }
 }
 
 impl Drop for Process {

@@ -101,18 +101,9 @@ impl Witness {
         self.event(plan, &[EventKind::Finished, EventKind::Superseded, EventKind::Aborted])
     }
 
-    /// Waits until telemetry reports a mode.
+    /// Waits until telemetry reports a mode. An executor that holds takes plans.
     pub fn mode(&mut self, mode: Mode) -> Result<Telemetry, WitnessError> {
         self.see(mode.text(), |t| t.mode == mode.wire())
-    }
-
-    /// Waits until the executor holds the arm and listens for plans; those are two of its threads.
-    pub fn ready(&mut self, ipc: &Ipc) -> Result<Telemetry, WitnessError> {
-        let held = self.mode(Mode::Hold)?;
-        let publisher = ipc.plan_publisher(1)?;
-        self.until("an executor that takes plans".into(), |_| {
-            publisher.has_executor().then_some(held)
-        })
     }
 
     /// Waits until telemetry that is newer than this call fits.
@@ -131,7 +122,8 @@ impl Witness {
         Ok(self.commands.call(kind, value, PATIENCE)?)
     }
 
-    fn until<T>(
+    /// Waits until what was seen so far gives an answer.
+    pub fn until<T>(
         &mut self,
         what: String,
         mut found: impl FnMut(&Self) -> Option<T>,

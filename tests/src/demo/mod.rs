@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::{Parser, ValueEnum};
-use nullsweep_ipc_types::ports::Ipc;
 use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
 use nullsweep_planner::plan::Plan;
 use serde::{Deserialize, Serialize};
@@ -21,7 +20,8 @@ use crate::latency::{Percentiles, of_buckets};
 use crate::measured::Swept;
 use crate::parts;
 use crate::stage::{Part, Process, Stage};
-use crate::witness::{PATIENCE, Witness};
+use crate::system::System;
+use crate::witness::{Witness, WitnessError};
 
 /// How long a plan may take to make.
 const PLANNING: Duration = Duration::from_secs(120);
@@ -247,36 +247,25 @@ fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
         plan(args, stage, "second", ["curvature", "effort"], &["--continue".into(), from])?;
 
     say("starting mock hardware and executor");
-    let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
-    let mut witness = Witness::open(&ipc)?;
-    let mut mock = start_mock(args, stage, &path)?;
-    let mut executor = start_executor(stage)?;
-    alive(witness.ready(&ipc), &mut [&mut mock, &mut executor])?;
+    let mut system = System::start(stage, mock_options(args, stage, &path), PATIENT)?;
 
     say(&format!("sweeping: {:.1} s in the first plan", first.figures.task_time_s));
     publish(stage, "first", Duration::from_secs(60), &[])?;
-    let (old, _) = started(&mut witness, &[], &mut [&mut mock, &mut executor])?;
+    let old = system.until(|w| w.see("a plan in motion", |t| t.plan.is_some()))?.plan;
     // Mid-motion: the arm is on the surface or on its way there, and the knot is still ahead.
     let early = 0.3 * at_s * 1e9;
-    alive(
-        witness.see("motion", |t| t.plan == old && t.plan_time_ns as f64 > early),
-        &mut [&mut mock, &mut executor],
-    )?;
+    system.until(|w| w.see("motion", |t| t.plan == old && t.plan_time_ns as f64 > early))?;
     say("publishing the second plan while the arm moves");
     let mut publisher = start_publish(stage, "second", &["--wait"])?;
-    let (new, accepted) = accepted(&mut witness, old, &mut [&mut mock, &mut executor])?;
+    let (new, accepted) = system.until(|w| accepted(w, old))?;
     let patience = Duration::from_secs_f64(60.0 + 3.0 * second.figures.task_time_s);
     finish(&mut publisher, patience)?;
-    alive(witness.mode(Mode::Hold), &mut [&mut mock, &mut executor])?;
-    let telemetry = witness.see("a last snapshot", |_| true)?;
+    system.until(|w| w.mode(Mode::Hold))?;
+    let telemetry = system.until(|w| w.see("a last snapshot", |_| true))?;
 
     say("done; asking the mock for its verdict");
-    executor.terminate(PATIENCE)?;
-    mock.terminate(PATIENCE)?;
-    let text = fs::read(stage.file("mock.json"))
-        .with_context(|| format!("no verdict of the mock: {}", tail(&mock.stderr())))?;
-    let found: MockOutcome = serde_json::from_slice(&text)?;
-    let events = witness.events();
+    let found: MockOutcome = system.end(stage)?;
+    let events = system.witness.events();
     let ended = |plan: PlanId, kind: EventKind| {
         events.iter().any(|e| e.plan == plan && e.kind == kind.wire())
     };
@@ -365,22 +354,13 @@ fn knot_time(plan: &Plan, knot: usize) -> f64 {
     plan.knots[knot].time_ns as f64 * 1e-9
 }
 
-fn start_mock(args: &Args, stage: &Stage, plan: &Path) -> anyhow::Result<Process> {
-    let mut options = stage.place().to_vec();
-    options.extend(["--plan".into(), plan.into()]);
-    options.extend(["--json".into(), stage.file("mock.json").into()]);
+fn mock_options(args: &Args, stage: &Stage, plan: &Path) -> Vec<OsString> {
+    let mut options: Vec<OsString> = vec!["--plan".into(), plan.into()];
     options.extend(["--record".into(), stage.file("record.csv").into()]);
     options.extend(["--timeout".into(), "100".into()]);
     let fidelity = args.fidelity.to_possible_value();
     options.extend(fidelity.map(|f| format!("--fidelity={}", f.get_name()).into()));
-    Ok(stage.start(Part::Mock, "mock", options)?)
-}
-
-fn start_executor(stage: &Stage) -> anyhow::Result<Process> {
-    let mut options: Vec<OsString> = vec!["run".into()];
-    options.extend(stage.place());
-    options.extend(PATIENT.map(Into::into));
-    Ok(stage.start(Part::Executor, "executor", options)?)
+    options
 }
 
 fn start_publish(stage: &Stage, name: &str, more: &[&str]) -> anyhow::Result<Process> {
@@ -400,67 +380,17 @@ fn finish(process: &mut Process, patience: Duration) -> anyhow::Result<()> {
     match process.wait(patience)? {
         Some(status) if status.success() => Ok(()),
         Some(status) => {
-            bail!("{} failed ({status}): {}", process.name(), tail(&process.stderr()))
+            bail!("{} failed ({status}): {}", process.name(), process.last_words())
         }
         None => bail!("{} did not end within {} s", process.name(), patience.as_secs()),
     }
 }
 
-/// The first plan that was started and is none of `known`, and its telemetry.
-fn started(
-    witness: &mut Witness,
-    known: &[PlanId],
-    others: &mut [&mut Process],
-) -> anyhow::Result<(PlanId, Telemetry)> {
-    let moving = |t: &Telemetry| t.plan.is_some() && !known.contains(&t.plan);
-    let telemetry = alive(witness.see("a plan in motion", moving), others)?;
-    Ok((telemetry.plan, telemetry))
-}
-
-/// The plan that was accepted after `old`, and the telemetry of that moment.
-fn accepted(
-    witness: &mut Witness,
-    old: PlanId,
-    others: &mut [&mut Process],
-) -> anyhow::Result<(PlanId, Telemetry)> {
-    let end = Instant::now() + PATIENCE;
-    loop {
-        witness.look()?;
-        let answer = |kind: u32| {
-            [EventKind::Accepted, EventKind::Rejected].map(EventKind::wire).contains(&kind)
-        };
-        if let Some(event) = witness.events().iter().find(|e| e.plan != old && answer(e.kind)) {
-            let telemetry = *witness.telemetry().context("no telemetry came")?;
-            return Ok((event.plan, telemetry));
-        }
-        if Instant::now() > end {
-            alive(
-                Err::<(), _>(anyhow::anyhow!("the second plan got no answer: {witness}")),
-                others,
-            )?;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-/// The result, or why it could not be had: a process that ended says more than what it left undone.
-fn alive<T, E: Into<anyhow::Error>>(
-    result: Result<T, E>,
-    processes: &mut [&mut Process],
-) -> anyhow::Result<T> {
-    result.map_err(|error| {
-        for process in processes {
-            if let Ok(Some(status)) = process.status() {
-                let (name, said) = (process.name().to_owned(), tail(&process.stderr()));
-                return anyhow::anyhow!("{name} ended ({status}): {said}");
-            }
-        }
-        error.into()
+/// The plan that was answered after `old` began, and the telemetry of that moment.
+fn accepted(witness: &mut Witness, old: PlanId) -> Result<(PlanId, Telemetry), WitnessError> {
+    let answers = [EventKind::Accepted, EventKind::Rejected].map(EventKind::wire);
+    witness.until("an answer to the second plan".into(), |w| {
+        let event = w.events().iter().find(|e| e.plan != old && answers.contains(&e.kind))?;
+        Some((event.plan, *w.telemetry()?))
     })
-}
-
-/// The last lines of what a process said.
-fn tail(text: &str) -> String {
-    let lines: Vec<_> = text.trim_end().lines().collect();
-    lines[lines.len().saturating_sub(8)..].join("\n  ")
 }

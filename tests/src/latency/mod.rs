@@ -20,7 +20,7 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use comfy_table::{CellAlignment, Table, presets};
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
-use nullsweep_ipc_types::{EventKind, HISTOGRAM_BUCKETS, PlanId};
+use nullsweep_ipc_types::{EventKind, HISTOGRAM_BUCKETS, Mode, PlanId};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, MAX_DOF, Robot, Side};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -29,7 +29,8 @@ use serde::Serialize;
 use crate::clock::sleep_until;
 use crate::parts;
 use crate::sketch::Sketch;
-use crate::stage::{Part, Process, Stage};
+use crate::stage::{Process, Stage};
+use crate::system::start_executor;
 use crate::witness::{PATIENCE, Witness};
 
 pub use stats::{Percentiles, Times, of_buckets};
@@ -187,14 +188,12 @@ fn measure(
     random: &mut ChaCha8Rng,
     sums: &mut Sums,
 ) -> anyhow::Result<()> {
-    let mut options: Vec<OsString> = vec!["run".into()];
-    options.extend(stage.place());
-    options.extend(["--priority".into(), args.priority.to_string().into()]);
+    let mut options: Vec<OsString> = vec!["--priority".into(), args.priority.to_string().into()];
     if let Some(cpu) = args.cpu {
         options.extend(["--cpu".into(), cpu.to_string().into()]);
     }
     options.extend(args.executor.iter().cloned());
-    let mut executor = stage.start(Part::Executor, "executor", options)?;
+    let mut executor = start_executor(stage, "executor", options)?;
     let (root, done) = (stage.root(), AtomicBool::new(false));
     thread::scope(|scope| {
         let endpoint =
@@ -239,7 +238,7 @@ fn publish(
 ) -> anyhow::Result<Vec<PlanId>> {
     let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
     let mut witness = Witness::open(&ipc)?;
-    let held = witness.ready(&ipc)?;
+    let held = witness.mode(Mode::Hold)?;
     let mut from = JointVector::default();
     from.copy_from_slice(&held.commanded[..MAX_DOF]);
     let sketch = Sketch::twitch(arm, &from, PLAN_ANGLE, args.knots, PLAN_SECONDS);

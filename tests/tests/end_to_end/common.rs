@@ -2,7 +2,7 @@
 
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 use nullsweep_tests::stage::{Process, Stage};
-use nullsweep_tests::witness::PATIENCE;
+use nullsweep_tests::system;
 use serde_json::Value;
 
 /// A stage whose processes are the demo program.
@@ -17,9 +17,5 @@ pub(crate) fn right_arm() -> Arm {
 
 /// Ends the mock and reads its verdict.
 pub(crate) fn verdict(stage: &Stage, mock: &mut Process) -> Value {
-    let status = mock.terminate(PATIENCE).expect("the mock can be asked");
-    assert!(status.is_some(), "the mock ends on SIGTERM");
-    let text = std::fs::read_to_string(stage.file("mock.json"))
-        .unwrap_or_else(|e| panic!("no verdict ({e}): {}", mock.stderr()));
-    serde_json::from_str(&text).expect("the verdict is JSON")
+    system::verdict(stage, mock).unwrap_or_else(|e| panic!("{e:#}"))
 }

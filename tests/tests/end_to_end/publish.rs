@@ -4,7 +4,6 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use nullsweep_ipc_types::EventKind;
-use nullsweep_ipc_types::ports::Ipc;
 use nullsweep_planner::cost::CostKind;
 use nullsweep_planner::formulation::Method;
 use nullsweep_planner::plan::{Continues, FORMAT, Held, Plan, PlanKnot, SurfaceSample};
@@ -12,10 +11,11 @@ use nullsweep_planner::tool::Tool;
 use nullsweep_robot::{Arm, JointVector};
 use nullsweep_tests::sketch::{Sketch, swung};
 use nullsweep_tests::stage::{Part, Process, Stage};
-use nullsweep_tests::witness::{PATIENCE, Witness};
+use nullsweep_tests::system::System;
+use nullsweep_tests::witness::PATIENCE;
 
 use crate::common::{right_arm, stage, verdict};
-use crate::rig::{start_executor, start_mock};
+use crate::rig;
 
 /// A plan file of a joint motion, with one point under the pad where it begins and one far away.
 fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
@@ -73,16 +73,8 @@ fn ended(mut process: Process) -> (Option<i32>, String) {
 }
 
 /// Mock and executor, the mock standing where the plan begins.
-fn start(stage: &Stage, plan: &Path) -> (Witness, Process, Process) {
-    let ipc = Ipc::open(stage.robot(), Some(&stage.root())).expect("the test's own ports");
-    let mut witness = Witness::open(&ipc).expect("the test can listen");
-    let path = plan.to_str().expect("UTF-8");
-    let mock = start_mock(stage, &["--plan", path]);
-    let executor = start_executor(stage, "executor");
-    if let Err(error) = witness.ready(&ipc) {
-        panic!("{error}\nmock: {}\nexecutor: {}", mock.stderr(), executor.stderr());
-    }
-    (witness, mock, executor)
+fn start(stage: &Stage, plan: &Path) -> System {
+    rig::start(stage, &["--plan", plan.to_str().expect("UTF-8")])
 }
 
 #[test]
@@ -94,7 +86,7 @@ fn a_plan_file_is_published_swept_and_continued() {
     let sketch = Sketch::through(&arm, &[from, arm.home(), from, arm.home()], 0.05);
     let first = plan(&arm, &sketch);
     let path = write(&stage, "first.json", &first);
-    let (mut witness, mut mock, _executor) = start(&stage, &path);
+    let System { mut mock, mut witness, executor: _executor, .. } = start(&stage, &path);
 
     let (code, said) = ended(publish(&stage, &path, &[]));
     assert_eq!(code, Some(0), "{said}");
@@ -125,7 +117,7 @@ fn a_plan_file_for_another_torso_height_is_rejected_with_its_reason() {
     let arm = right_arm();
     let sketch = Sketch::swings(&arm, &arm.home(), 1, 0.1, 0.1);
     let path = write(&stage, "plan.json", &plan(&arm, &sketch));
-    let (_witness, mut mock, _executor) = start(&stage, &path);
+    let System { mut mock, executor: _executor, .. } = start(&stage, &path);
     let other = arm.with_held(&[("torso_lift_joint", 0.3)]).expect("a torso");
     let other = write(&stage, "other.json", &plan(&other, &sketch));
     let (code, said) = ended(publish(&stage, &other, &[]));

@@ -1,12 +1,11 @@
 //! One system of a test's own: mock, executor and a publisher under one root path.
 
-use std::ffi::OsString;
-
-use nullsweep_ipc_types::ports::{Ipc, PlanPublisher};
+use nullsweep_ipc_types::ports::PlanPublisher;
 use nullsweep_ipc_types::{EventKind, MAX_KNOTS, PlanEvent, PlanId, Reason};
 use nullsweep_robot::Arm;
 use nullsweep_tests::sketch::Sketch;
-use nullsweep_tests::stage::{Part, Process, Stage};
+use nullsweep_tests::stage::{Process, Stage};
+use nullsweep_tests::system::{self, System};
 use nullsweep_tests::witness::Witness;
 use serde_json::Value;
 
@@ -23,23 +22,18 @@ pub(crate) struct Rig {
     pub(crate) stage: Stage,
 }
 
-pub(crate) fn start_mock(stage: &Stage, more: &[&str]) -> Process {
-    let mut args = stage.place().to_vec();
-    // A loaded machine may stall a process for longer than a robot would bear.
-    args.extend(["--timeout", "500", "--json"].map(OsString::from));
-    args.push(stage.file("mock.json").into());
-    args.extend(more.iter().map(OsString::from));
-    stage.start(Part::Mock, "mock", args).expect("the mock starts")
+/// Mock and executor that hold the arm. A loaded machine may stall a process for longer than a
+/// robot would bear, and must not look like a broken one.
+pub(crate) fn start(stage: &Stage, mock: &[&str]) -> System {
+    let mock = ["--timeout", "500"].iter().chain(mock);
+    System::start(stage, mock, EXECUTOR_PATIENCE).unwrap_or_else(|e| panic!("{e:#}"))
 }
 
+/// An executor in a dead one's place.
 pub(crate) fn start_executor(stage: &Stage, name: &str) -> Process {
-    let mut args: Vec<OsString> = vec!["run".into()];
-    args.extend(stage.place());
-    args.extend(EXECUTOR_PATIENCE.iter().map(OsString::from));
-    stage.start(Part::Executor, name, args).expect("the executor starts")
+    system::start_executor(stage, name, EXECUTOR_PATIENCE).expect("the executor starts")
 }
 
-/// As for the mock: a loaded machine must not look like a broken robot.
 const EXECUTOR_PATIENCE: [&str; 8] =
     ["--stale-ms", "500", "--lost-ms", "1500", "--min-rate", "0.01", "--spin-us", "0"];
 
@@ -48,14 +42,8 @@ impl Rig {
     pub(crate) fn start() -> Self {
         let stage = stage();
         let arm = right_arm();
-        let ipc = Ipc::open(stage.robot(), Some(&stage.root())).expect("the test's own ports");
-        let mut witness = Witness::open(&ipc).expect("the test can listen");
-        let mock = start_mock(&stage, &[]);
-        let executor = start_executor(&stage, "executor");
+        let System { mock, executor, witness, ipc } = start(&stage, &[]);
         let publisher = ipc.plan_publisher(MAX_KNOTS).expect("the test can publish");
-        if let Err(error) = witness.ready(&ipc) {
-            panic!("{error}\nmock: {}\nexecutor: {}", mock.stderr(), executor.stderr());
-        }
         Self { executor, mock, witness, publisher, arm, stage }
     }
 
