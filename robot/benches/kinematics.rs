@@ -1,7 +1,8 @@
-//! Kinematics on one core: `cargo bench -p nullsweep-robot`. The numeric solver on the same targets
-//! is the baseline of the closed form.
+//! Kinematics on one core: `cargo bench -p nullsweep-robot`. The crate `k` and the own numeric solver
+//! on the same targets are the baselines of the closed form.
 
 use divan::{Bencher, black_box};
+use k::InverseKinematicsSolver;
 use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Solutions};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -97,6 +98,52 @@ fn pr2_inverse_on_one_branch(bencher: Bencher<'_, '_>) {
         let (target, q, branch) = black_box(&cases[i]);
         arm.ik().solve_on(*branch, target, q[2], q)
     });
+}
+
+/// The right arm as the crate `k` has it, from the same URDF.
+fn k_arm() -> k::SerialChain<f64> {
+    let urdf = concat!(env!("CARGO_MANIFEST_DIR"), "/pr2.urdf");
+    let robot = k::Chain::<f64>::from_urdf_file(urdf).expect("k reads the PR2");
+    let node = |name: &str| robot.find(name).expect("a joint of the PR2").clone();
+    k::SerialChain::from_end_to_root(&node("r_gripper_tool_joint"), &node("r_shoulder_pan_joint"))
+}
+
+/// Baseline of [`pr2_forward`].
+#[divan::bench(sample_size = 100)]
+fn k_forward(bencher: Bencher<'_, '_>) {
+    let (arm, k) = (pr2(), k_arm());
+    let qs = configurations(&arm);
+    let mut i = 0;
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        k.set_joint_positions_unchecked(black_box(&qs[i][..7]));
+        k.end_transform()
+    });
+}
+
+/// Baseline of [`pr2_inverse_all_for_one_roll`]: one solution within 1 mm and 5 mrad from a start
+/// that is a tenth of a radian off in each joint, its roll free.
+#[divan::bench(sample_size = 10)]
+fn k_inverse_one_near_the_start(bencher: Bencher<'_, '_>) {
+    let (arm, k) = (pr2(), k_arm());
+    let solver = k::JacobianIkSolver::default();
+    let cases: Vec<_> = configurations(&arm)
+        .into_iter()
+        .map(|q| {
+            k.set_joint_positions_unchecked(&q[..7]);
+            (k.end_transform(), q.map(|v| v + 0.1))
+        })
+        .collect();
+    let mut i = 0;
+    let (mut solved, mut asked) = (0, 0);
+    bencher.bench_local(|| {
+        i = (i + 1) % COUNT;
+        let (target, start) = black_box(&cases[i]);
+        k.set_joint_positions_clamped(&start[..7]);
+        asked += 1;
+        solved += usize::from(solver.solve(&k, target).is_ok());
+    });
+    println!("k solved {solved} of {asked}");
 }
 
 /// The same targets as [`pr2_inverse_all_for_one_roll`], by the solver for arms of any shape.
