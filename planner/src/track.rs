@@ -143,14 +143,20 @@ impl Workcell<'_> {
             run.span(i, (0.0, near), (1.0, q), pose, MAX_HALVINGS)?;
         }
         let arrived = run.last();
-        let misses = (0..MAX_DOF).any(|j| wrap(arrived[j] - to.q[j]).abs() > 1e-6);
-        if misses { Err(TrackFailure::Elsewhere) } else { Ok(run.track) }
+        if (0..MAX_DOF).any(|j| wrap(arrived[j] - to.q[j]).abs() > 1e-6) {
+            return Err(TrackFailure::Elsewhere);
+        }
+        // All at once: much of what one joint vector proves holds for its neighbours too.
+        if !self.world.all_free(&run.track.joints, ToolContact::Allowed) {
+            return Err(TrackFailure::Collision);
+        }
+        Ok(run.track)
     }
 
     /// Whether the whole motion along the track, the pad on the surface, is free of collision.
     #[must_use]
     pub fn is_proven(&self, track: &[JointVector]) -> bool {
-        track.windows(2).all(|w| self.world.motion_free(&w[0], &w[1], ToolContact::Allowed))
+        self.world.path_free(track, ToolContact::Allowed)
     }
 }
 
@@ -174,7 +180,7 @@ impl Run<'_> {
         self.track.line.push(Point3::from(pose.translation.vector));
     }
 
-    /// The branch's joint vector at a pose, inside the limits and free of collision.
+    /// The branch's joint vector at a pose, inside the limits.
     fn solve(
         &self,
         pose: &Isometry3<f64>,
@@ -190,9 +196,6 @@ impl Run<'_> {
         }
         if !self.cell.arm.within_margins(&q) {
             return Err(TrackFailure::Limit);
-        }
-        if !self.cell.world.is_free(&q, ToolContact::Allowed) {
-            return Err(TrackFailure::Collision);
         }
         Ok(q)
     }

@@ -39,6 +39,24 @@ pub(crate) struct Bodies {
 }
 
 impl Body {
+    /// The joint's value where the joint vector's entry is `q`. \[rad\] or \[m\]
+    #[inline]
+    pub(crate) fn value(&self, q: f64) -> f64 {
+        self.multiplier * q + self.offset
+    }
+
+    /// The body's frame in its parent's at a value of its joint.
+    #[inline]
+    pub(crate) fn local(&self, value: f64) -> Frame {
+        if self.prismatic {
+            let slide = self.rest.rotation * (self.axis * value);
+            return Frame { translation: self.rest.translation + slide, ..self.rest };
+        }
+        let (sine, cosine) = value.sin_cos();
+        let turned = self.turned[0] * sine + self.turned[1] * (1.0 - cosine);
+        Frame { rotation: self.rest.rotation + turned, ..self.rest }
+    }
+
     /// How far the body slides from its rest place at most, its joint within ±`travel`. \[m\]
     pub(crate) fn most_slide(&self, travel: f64) -> f64 {
         self.multiplier.abs() * travel + self.offset.abs()
@@ -137,36 +155,12 @@ impl Bodies {
     pub(crate) fn poses(&self, q: &JointVector) -> [Frame; MAX_BODIES] {
         let mut out = [Frame::IDENTITY; MAX_BODIES];
         for (i, body) in self.bodies.iter().enumerate() {
-            let value = body.multiplier * q[body.joint] + body.offset;
-            let local = if body.prismatic {
-                let slide = body.rest.rotation * (body.axis * value);
-                Frame { rotation: body.rest.rotation, translation: body.rest.translation + slide }
-            } else {
-                let (sine, cosine) = value.sin_cos();
-                Frame {
-                    rotation: body.rest.rotation
-                        + body.turned[0] * sine
-                        + body.turned[1] * (1.0 - cosine),
-                    translation: body.rest.translation,
-                }
-            };
+            let local = body.local(body.value(q[body.joint]));
             out[i] = match body.parent {
                 Some(parent) => out[parent].then(&local),
                 None => local,
             };
         }
         out
-    }
-
-    /// Whether `ancestor` is `body` or one of the bodies that it hangs on.
-    pub(crate) fn is_ancestor(&self, ancestor: usize, body: usize) -> bool {
-        let mut at = Some(body);
-        while let Some(b) = at {
-            if b == ancestor {
-                return true;
-            }
-            at = self.bodies[b].parent;
-        }
-        false
     }
 }

@@ -4,7 +4,9 @@ use super::ToolContact;
 use super::bodies::MAX_BODIES;
 use super::frame::Frame;
 use super::motion::Slack;
+use super::proof::Check;
 use super::solid::Solid;
+use super::spheres::Sphere;
 use super::world::{Fixed, Moving, World};
 use crate::collision::Hit;
 use nalgebra::Vector3;
@@ -23,9 +25,7 @@ impl World {
     /// Whether everything that moves with the arm keeps its margins. NaN and ∞ are not free.
     #[must_use]
     pub fn is_free(&self, q: &JointVector, contact: ToolContact) -> bool {
-        let inside = |(value, travel): (&f64, &f64)| value.is_finite() && value.abs() <= *travel;
-        q.iter().zip(&self.travel).all(inside)
-            && self.are_clear(&self.bodies.poses(q), contact, &Slack::NONE)
+        self.is_in_range(q) && self.are_clear(&self.bodies.poses(q), contact, &Slack::NONE)
     }
 
     /// The first pair too near, for messages; from the exact check, so it is slow.
@@ -74,15 +74,14 @@ impl World {
         let margin = match touch {
             // The pad is clear if no point is where its keep-out boxes are.
             Some(touch) if touch.depth == f64::INFINITY => {
-                return touch.tree.all(
-                    |s| self.field.is_farther(&pose.apply(&s.centre), s.radius + slack),
-                    |s| {
-                        let reach = s.radius + slack;
-                        self.field.all_within(&pose.apply(&s.centre), reach, |p| {
-                            self.point_value(shape, pose, contact, p, slack) >= slack
-                        })
-                    },
-                );
+                let far =
+                    |s: &Sphere| self.field.is_farther(&pose.apply(&s.centre), s.radius + slack);
+                return touch.tree.all(far, |_| false) || {
+                    let (low, high) = touch.bounds(pose, slack);
+                    self.field.all_in_box(&low, &high, |p| {
+                        self.point_value(shape, pose, contact, p, slack) >= slack
+                    })
+                };
             }
             Some(touch) => touch.margin,
             None => self.margins.environment,
@@ -102,6 +101,43 @@ impl World {
         self.field.all_in_box(&(centre - half), &(centre + half), |p| {
             shape.solid.distance_bound(&at.apply_inverse(p)) >= need
                 || self.point_value(shape, pose, contact, p, slack) >= slack
+        })
+    }
+
+    /// Whether one check holds with the slack added, the bodies standing at `poses`.
+    pub(super) fn holds(
+        &self,
+        check: Check,
+        poses: &[Frame; MAX_BODIES],
+        contact: ToolContact,
+        slack: &Slack<'_>,
+    ) -> bool {
+        match check {
+            Check::Scan(shape) => {
+                let shape = &self.moving[shape];
+                let need = slack.body[shape.body] + TOLERANCE;
+                self.is_clear_of_scan(shape, &poses[shape.body], contact, need)
+            }
+            Check::Fixed(shape) => {
+                let shape = &self.moving[shape];
+                let need = slack.body[shape.body] + TOLERANCE;
+                self.is_clear_of_fixed(shape, &poses[shape.body], u128::MAX, need)
+            }
+            Check::Pair(pair) => {
+                let (a, b) = self.pairs[pair];
+                let between = slack.between(self.moving[a].body, self.moving[b].body);
+                let need = self.margins.self_clearance + between + TOLERANCE;
+                self.is_moving_pair_clear(a, b, poses, need)
+            }
+        }
+    }
+
+    /// The bodies that the checks are about, one bit each.
+    pub(super) fn bodies_of(&self, checks: &[Check]) -> u32 {
+        let bit = |shape: usize| 1u32 << self.moving[shape].body;
+        checks.iter().fold(0, |bits, check| match *check {
+            Check::Scan(shape) | Check::Fixed(shape) => bits | bit(shape),
+            Check::Pair(pair) => bits | bit(self.pairs[pair].0) | bit(self.pairs[pair].1),
         })
     }
 
@@ -168,8 +204,7 @@ impl World {
         let mut bodies = (usize::MAX, usize::MAX);
         let (mut need, mut far) = (0.0, false);
         self.pairs.iter().all(|&(a, b)| {
-            let (first, second) = (&self.moving[a], &self.moving[b]);
-            let (i, j) = (first.body, second.body);
+            let (i, j) = (self.moving[a].body, self.moving[b].body);
             if bodies != (i, j) {
                 // The pairs of two bodies follow each other.
                 bodies = (i, j);
@@ -180,18 +215,29 @@ impl World {
             if far {
                 return true;
             }
-            let (ra, rb) = (first.tree.root().radius, second.tree.root().radius);
-            let reach = ra + rb + need;
-            let between = poses[i].apply(&first.tree.root().centre)
-                - poses[j].apply(&second.tree.root().centre);
-            if between.norm_squared() >= reach * reach {
-                return true;
-            }
-            // The spheres of the smaller shape against the solid of the larger.
-            let (small, large) = if ra <= rb { (first, second) } else { (second, first) };
-            let relative = poses[large.body].inverse_then(&poses[small.body]);
-            is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
+            self.is_moving_pair_clear(a, b, poses, need)
         })
+    }
+
+    fn is_moving_pair_clear(
+        &self,
+        a: usize,
+        b: usize,
+        poses: &[Frame; MAX_BODIES],
+        need: f64,
+    ) -> bool {
+        let (first, second) = (&self.moving[a], &self.moving[b]);
+        let (ra, rb) = (first.tree.root().radius, second.tree.root().radius);
+        let reach = ra + rb + need;
+        let between = poses[first.body].apply(&first.tree.root().centre)
+            - poses[second.body].apply(&second.tree.root().centre);
+        if between.norm_squared() >= reach * reach {
+            return true;
+        }
+        // The spheres of the smaller shape against the solid of the larger.
+        let (small, large) = if ra <= rb { (first, second) } else { (second, first) };
+        let relative = poses[large.body].inverse_then(&poses[small.body]);
+        is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
     }
 }
 

@@ -12,13 +12,12 @@ const FAR: f64 = 0.5;
 const NEAR: f64 = 0.03;
 
 impl World {
-    /// A lower bound of distance − margin over all pairs, at most 0.5 m; ≤ 0: not proven free. It
+    /// A lower bound of distance − margin over all pairs that could ever be too near, at most 0.5 m; ≤ 0: not proven free. It
     /// is the true value where that is below 3 cm, and some cm below it elsewhere. In contact, for scan points that may touch, it is how far the shape may move before they break
     /// the contact rule. Slower than [`World::is_free`]. \[m\]
     #[must_use]
     pub fn clearance(&self, q: &JointVector, contact: ToolContact) -> f64 {
-        let inside = |(value, travel): (&f64, &f64)| value.is_finite() && value.abs() <= *travel;
-        if !q.iter().zip(&self.travel).all(inside) {
+        if !self.is_in_range(q) {
             return f64::NEG_INFINITY;
         }
         let poses = self.bodies.poses(q);

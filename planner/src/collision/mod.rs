@@ -9,7 +9,9 @@
 //! - Each shape that moves with the arm (the links' own shapes, attached objects, the tool's pad)
 //!   against the robot's other shapes, with [`Margins::self_clearance`]. Left out are links that
 //!   are rigid to each other, links joined by a joint, and shapes that always touch, or that an
-//!   SRDF disables: [`World::excluded`] lists them with the [`Reason`].
+//!   SRDF disables: [`World::excluded`] lists them with the [`Reason`]. The fast check also leaves
+//!   out pairs that are proven never to come near each other; a joint more than 0.35 rad beyond its
+//!   limits, where no proof was made, counts as a collision there.
 //! - Each of them against the scan's points and the obstacles, with [`Margins::environment`].
 //! - What does not move with the arm against the environment, once: [`World::stance_hit`].
 //!
@@ -38,8 +40,10 @@ mod field;
 mod frame;
 mod mesh;
 mod motion;
+mod never;
 mod pairs;
 mod parts;
+mod proof;
 mod solid;
 mod spheres;
 mod srdf;

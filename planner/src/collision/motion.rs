@@ -1,12 +1,10 @@
-//! Motions along straight joint lines: how far any point can move, and proofs that none collides.
+//! How far any point of the arm can move, whatever the configuration, between joint vectors.
 
-use super::ToolContact;
 use super::bodies::{Bodies, MAX_BODIES};
 use super::frame::Frame;
 use super::world::{Moving, World};
 use nalgebra::Vector3;
-use nullsweep_robot::{Arm, JointVector, MAX_DOF};
-use std::collections::VecDeque;
+use nullsweep_robot::{Arm, JointVector};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// How much farther than its margin each body has to be. \[m\]
@@ -14,19 +12,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 pub(crate) struct Slack<'a> {
     /// Relative to the root frame.
     pub(crate) body: [f64; MAX_BODIES],
-    /// Relative to another body: this fraction of the motion's ways, if that is less.
-    ways: Option<(&'a Ways, f64)>,
-}
-
-/// What a straight joint line does to each body at most.
-#[derive(Clone, Debug)]
-struct Ways {
-    /// The longest way of a point in the root frame. \[m\]
-    body: [f64; MAX_BODIES],
-    /// In the frame of another body: the joints before both do not count. \[m\]
-    between: [[f64; MAX_BODIES]; MAX_BODIES],
-    /// The acceleration of a point if the motion takes one unit of time. \[m\]
-    bend: [f64; MAX_BODIES],
+    /// Relative to another body: what these ways of the joints give, if that is less.
+    joints: Option<(&'a Reach, JointVector)>,
 }
 
 /// How far the parts of each body can be from each joint's axis, whatever the configuration.
@@ -55,17 +42,19 @@ struct Lever {
     rate: f64,
 }
 
-/// A motion is halved at most this often before it counts as not proven.
-const HALVINGS: u32 = 7;
+impl<'a> Slack<'a> {
+    pub(crate) const NONE: Self = Self { body: [0.0; MAX_BODIES], joints: None };
 
-impl Slack<'_> {
-    pub(crate) const NONE: Self = Self { body: [0.0; MAX_BODIES], ways: None };
+    /// For a motion that takes each joint this way at most. \[rad\] or \[m\]
+    pub(crate) fn new(reach: &'a Reach, way: JointVector) -> Self {
+        Self { body: [0.0; MAX_BODIES], joints: Some((reach, way)) }
+    }
 
     /// Bound of the motion of two bodies relative to each other. \[m\]
     #[inline]
     pub(crate) fn between(&self, a: usize, b: usize) -> f64 {
         let both = self.body[a] + self.body[b];
-        self.ways.map_or(both, |(ways, fraction)| both.min(fraction * ways.between[a][b]))
+        self.joints.as_ref().map_or(both, |(reach, way)| both.min(reach.between(a, b, way)))
     }
 }
 
@@ -139,74 +128,53 @@ impl Reach {
         Self { lever, ball, centre, radius, travel }
     }
 
-    /// The largest ways between `a` and `b`.
-    fn ways(&self, bodies: &Bodies, a: &JointVector, b: &JointVector) -> Ways {
-        let change: [f64; MAX_DOF] = std::array::from_fn(|j| (b[j] - a[j]).abs());
-        let mut slack = Ways {
-            body: [0.0; MAX_BODIES],
-            between: [[0.0; MAX_BODIES]; MAX_BODIES],
-            bend: [0.0; MAX_BODIES],
-        };
-        let count = self.lever.len();
-        for body in 0..count {
-            let way = |until: Option<usize>| -> f64 {
-                self.lever[body]
-                    .iter()
-                    .take_while(|l| Some(l.body) != until)
-                    .filter(|l| change[l.joint] > 0.0)
-                    .map(|l| l.way * change[l.joint])
-                    .sum()
-            };
-            slack.body[body] = way(None);
-            // A point x moves with ẍ = Σₖⱼ q̇ₖ q̇ⱼ hₖⱼ, where |hₖⱼ| is the distance of x from the
-            // axis of the later of both joints at most.
-            for k in &self.lever[body] {
-                for j in &self.lever[body] {
-                    let changes = change[k.joint] * change[j.joint];
-                    if changes > 0.0 {
-                        slack.bend[body] += changes * (k.way * j.rate).max(j.way * k.rate);
-                    }
-                }
-            }
-            for other in 0..body {
-                if bodies.is_ancestor(other, body) {
-                    slack.between[body][other] = way(Some(other));
-                } else {
-                    slack.between[body][other] = slack.body[body] + slack.body[other];
-                }
-                slack.between[other][body] = slack.between[body][other];
-            }
-        }
-        slack
+    /// How far a point of a body moves at most, in the root frame, while each joint goes no farther
+    /// than `way`. \[m\]
+    #[inline]
+    pub(crate) fn way(&self, body: usize, way: &JointVector) -> f64 {
+        self.lever[body].iter().map(|l| l.way * way[l.joint]).sum()
     }
 
-    /// How far any point of each body is at most from where it is at `middle`, while the joints go
-    /// from there to both ends, which are half of `fraction` of the motion away: by the chord to
-    /// either end and how far the way can bend away from it, or by the ways along it.
-    fn slack<'a>(
-        &self,
-        ways: &'a Ways,
-        fraction: f64,
-        middle: &[Frame; MAX_BODIES],
-        ends: [&[Frame; MAX_BODIES]; 2],
-    ) -> Slack<'a> {
-        let half = 0.5 * fraction;
-        let mut body = [0.0; MAX_BODIES];
-        for (i, (centre, radius)) in self.ball.iter().enumerate() {
-            let from = middle[i].apply(centre);
-            let chord = ends
-                .iter()
-                .map(|end| {
-                    // A turn by θ moves a point at distance ρ by 2 sin(θ/2) ρ, and the Frobenius
-                    // norm of the change of the rotation matrix is 2 √2 sin(θ/2).
-                    let turn = (end[i].rotation - middle[i].rotation).norm() * FRAC_1_SQRT_2;
-                    (end[i].apply(centre) - from).norm() + turn * radius
-                })
-                .fold(0.0, f64::max);
-            let bend = ways.bend[i] * half * half / 8.0;
-            body[i] = (chord + bend).min(half * ways.body[i]);
+    /// The same in the frame of another body: the joints before both do not count. Infinite if
+    /// neither hangs on the other.
+    fn between(&self, a: usize, b: usize, way: &JointVector) -> f64 {
+        // Parents come first.
+        let (low, high) = (a.max(b), a.min(b));
+        let mut sum = 0.0;
+        for l in &self.lever[low] {
+            if l.body == high {
+                return sum;
+            }
+            sum += l.way * way[l.joint];
         }
-        Slack { body, ways: Some((ways, half)) }
+        f64::INFINITY
+    }
+
+    /// How far a point of a body can be from the straight line between its places at both ends of a
+    /// straight joint line that takes each joint the way `way`. \[m\]
+    pub(crate) fn bend(&self, body: usize, way: &JointVector) -> f64 {
+        // A point x moves with ẍ = Σₖⱼ q̇ₖ q̇ⱼ hₖⱼ, where |hₖⱼ| is the distance of x from the axis
+        // of the later of both joints at most; in unit time that bends its way by an eighth.
+        let levers = &self.lever[body];
+        let pull = |k: &Lever, j: &Lever| {
+            way[k.joint] * way[j.joint] * (k.way * j.rate).max(j.way * k.rate)
+        };
+        levers.iter().map(|k| levers.iter().map(|j| pull(k, j)).sum::<f64>()).sum::<f64>() / 8.0
+    }
+
+    /// How far any point of a body is at `to` from where it is at `from`, at most; the frames are
+    /// the body's, the points the ball's centre in them. \[m\]
+    #[inline]
+    pub(crate) fn chord(
+        &self,
+        body: usize,
+        (from, from_centre): (&Frame, &Vector3<f64>),
+        (to, to_centre): (&Frame, &Vector3<f64>),
+    ) -> f64 {
+        // A turn by θ moves a point at distance ρ by 2 sin(θ/2) ρ, and the Frobenius norm of the
+        // change of the rotation matrix is 2 √2 sin(θ/2).
+        let turn = (to.rotation - from.rotation).norm() * FRAC_1_SQRT_2;
+        (to_centre - from_centre).norm() + turn * self.ball[body].1
     }
 }
 
@@ -215,36 +183,8 @@ impl World {
     /// joint line from `a` to `b`. \[m\]
     #[must_use]
     pub fn motion_bound(&self, a: &JointVector, b: &JointVector) -> f64 {
-        self.reach.ways(&self.bodies, a, b).body.iter().copied().fold(0.0, f64::max)
-    }
-
-    /// Whether the whole straight joint line from `a` to `b` is proven free: by bisection until, at
-    /// each piece's middle, every distance exceeds its margin by what the bodies can move from
-    /// there to the piece's ends. False if a collision is found, or if no proof is found within
-    /// 7 halvings (a motion that grazes a margin).
-    #[must_use]
-    pub fn motion_free(&self, a: &JointVector, b: &JointVector, contact: ToolContact) -> bool {
-        let ways = self.reach.ways(&self.bodies, a, b);
-        // The ends first: they are where a useless motion is most often seen to be one.
-        if !self.is_free(b, contact) || !self.is_free(a, contact) {
-            return false;
-        }
-        // Coarse pieces first: they find a collision soonest.
-        let mut open = VecDeque::from([(0.0, 1.0, 0)]);
-        while let Some((from, to, depth)) = open.pop_front() {
-            let middle = 0.5 * (from + to);
-            let at = |t: f64| -> JointVector { std::array::from_fn(|j| a[j] + t * (b[j] - a[j])) };
-            let [first, poses, last] = [from, middle, to].map(|t| self.bodies.poses(&at(t)));
-            let slack = self.reach.slack(&ways, to - from, &poses, [&first, &last]);
-            if self.are_clear(&poses, contact, &slack) {
-                continue;
-            }
-            if depth == HALVINGS || !self.are_clear(&poses, contact, &Slack::NONE) {
-                return false;
-            }
-            open.push_back((from, middle, depth + 1));
-            open.push_back((middle, to, depth + 1));
-        }
-        true
+        let way: JointVector = std::array::from_fn(|j| (b[j] - a[j]).abs());
+        let bodies = 0..self.bodies.bodies.len();
+        bodies.map(|body| self.reach.way(body, &way)).fold(0.0, f64::max)
     }
 }

@@ -137,7 +137,7 @@ impl Solid {
 
     /// How far the solid reaches from its centre along a unit vector, at most. \[m\]
     #[inline]
-    fn extent(&self, n: &Vector3<f64>) -> f64 {
+    pub(crate) fn extent(&self, n: &Vector3<f64>) -> f64 {
         match self {
             Self::Ball { radius } => *radius,
             Self::Capsule { half, radius } => half * n.z.abs() + radius,

@@ -6,6 +6,7 @@ use super::field::Field;
 use super::frame::Frame;
 use super::mesh::{MeshError, read_stl};
 use super::motion::Reach;
+use super::never::{self, Placed, Ranges, never_near};
 use super::pairs::{self, Excluded};
 use super::parts::{self, Part};
 use super::solid::{Hull, Solid};
@@ -13,7 +14,7 @@ use super::spheres::SphereTree;
 use super::{CollisionError, Hit, Margins, Obstacle, ObstacleShape, Options};
 use crate::tool::Tool;
 use nalgebra::{Point3, Vector3};
-use nullsweep_robot::{Arm, MAX_DOF, Robot};
+use nullsweep_robot::{Arm, JointVector, Robot};
 use parry3d_f64::shape::SharedShape;
 
 /// The robot at one stance with its tool, scan and obstacles: immutable, shared between threads.
@@ -30,8 +31,9 @@ pub struct World {
     pub(crate) reach: Reach,
     pub(crate) margins: Margins,
     pub(crate) contact: Contact,
-    /// Largest |value| of each joint for which dropped scan points are out of reach.
-    pub(crate) travel: [f64; MAX_DOF],
+    /// Where each joint may be asked about: beyond, dropped scan points may be in reach and dropped
+    /// pairs near each other. \[rad\] or \[m\]
+    pub(crate) ranges: Ranges,
     pub(crate) scene: Scene,
     excluded: Vec<Excluded>,
     notes: Vec<String>,
@@ -175,7 +177,8 @@ impl World {
 
         let reach = Reach::new(&bodies, arm, &moving);
         let field = Field::new(scan_points, &reach.centre, reach.radius + margins.environment);
-        let travel = std::array::from_fn(|j| reach.travel.get(j).copied().unwrap_or(f64::INFINITY));
+        let ranges = never::ranges(arm, &reach.travel);
+        leave_out(&bodies, &ranges, &mut moving, &fixed, &mut moving_pairs, &margins);
         let scene = Scene {
             shapes,
             moves: body_of.iter().map(Option::is_some).collect(),
@@ -197,7 +200,7 @@ impl World {
             reach,
             margins,
             contact,
-            travel,
+            ranges,
             scene,
             excluded: pairs.excluded,
             notes,
@@ -223,10 +226,44 @@ impl World {
         self.exact().stance_hit()
     }
 
+    /// Whether every joint is where it may be asked about; NaN is not.
+    #[inline]
+    pub(crate) fn is_in_range(&self, q: &JointVector) -> bool {
+        let inside = |(value, (low, high)): (&f64, &(f64, f64))| {
+            value.is_finite() && low <= value && value <= high
+        };
+        q.iter().zip(&self.ranges).all(inside)
+    }
+
     /// The exact check: slow, and independent of the fast one.
     #[must_use]
     pub fn exact(&self) -> Exact<'_> {
         Exact::new(self)
+    }
+}
+
+/// Drops the pairs of the robot's shapes that are proven never to come near each other.
+fn leave_out(
+    bodies: &Bodies,
+    ranges: &Ranges,
+    moving: &mut [Moving],
+    fixed: &[Fixed],
+    pairs: &mut Vec<(usize, usize)>,
+    margins: &Margins,
+) {
+    let need = margins.self_clearance;
+    let never = |a: &Moving, body: Option<usize>, place: &Frame, solid: &Solid| {
+        let own = Placed { body: Some(a.body), place: &a.place, solid: &a.solid };
+        never_near(bodies, ranges, own, Placed { body, place, solid }, need)
+    };
+    pairs.retain(|&(a, b)| {
+        let b = &moving[b];
+        !never(&moving[a], Some(b.body), &b.place, &b.solid)
+    });
+    for k in 0..moving.len() {
+        let mut against = std::mem::take(&mut moving[k].against);
+        against.retain(|&f| !never(&moving[k], None, &fixed[f].place, &fixed[f].solid));
+        moving[k].against = against;
     }
 }
 
@@ -275,6 +312,17 @@ impl Fixed {
 }
 
 impl Touch {
+    /// Bounds of the keep-out boxes grown by `more`, the body standing at `pose`, in the root
+    /// frame. \[m\]
+    pub(crate) fn bounds(&self, pose: &Frame, more: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let nowhere = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        let (low, high) = self.corners.iter().fold(nowhere, |(low, high), corner| {
+            let at = pose.apply(corner);
+            (low.inf(&at), high.sup(&at))
+        });
+        (low - Vector3::repeat(more), high + Vector3::repeat(more))
+    }
+
     fn new(
         part: &Part,
         solid: &Solid,
