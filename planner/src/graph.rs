@@ -1,9 +1,12 @@
 //! The Euclidean graph over the reachable patches (paper §III.A), with tracked edges.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::patches::Patch;
+use crate::progress::Progress;
 use crate::reach::{
     Sample, Workcell, contact_pose, direction, heading_of, middle_out, redundancies,
 };
@@ -52,6 +55,29 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// The edge along the surface line between two patches, whether or not the arm can follow it;
+    /// `None` where there is no line. `step` of the line in \[m\].
+    #[must_use]
+    pub fn between(
+        surface: &Surface,
+        patches: &[Patch],
+        a: usize,
+        b: usize,
+        step: f64,
+    ) -> Option<Self> {
+        let end = |i: usize| SurfacePoint { point: patches[i].centre, normal: patches[i].normal };
+        let line = surface.line(&end(a), &end(b), step)?;
+        let last = line.len() - 1;
+        Some(Self {
+            a,
+            b,
+            heading_a: heading_of(&line[0].normal, &(line[1].point - line[0].point)),
+            heading_b: heading_of(&line[last].normal, &(line[last].point - line[last - 1].point)),
+            line,
+            turn: 0.0,
+        })
+    }
+
     /// Straight distance between the two patches. \[m\]
     #[must_use]
     pub fn chord(&self) -> f64 {
@@ -83,20 +109,30 @@ pub struct Graph {
     pub components: Vec<Vec<usize>>,
     /// Pairs of neighbours that were tried.
     pub candidates: usize,
+    /// Those of them (a < b) that no edge joins.
+    apart: HashSet<(usize, usize)>,
 }
 
 impl Graph {
     /// The edge between two patches.
     #[must_use]
     pub fn between(&self, a: usize, b: usize) -> Option<usize> {
-        self.incident[a].iter().copied().find(|&e| self.edges[e].other(a) == b)
+        self.incident.get(a)?.iter().copied().find(|&e| self.edges[e].other(a) == b)
+    }
+
+    /// What was found between two patches, a < b; `None` if they were not tried.
+    fn known(&self, a: usize, b: usize) -> Option<Option<Edge>> {
+        match self.between(a, b) {
+            Some(edge) => Some(Some(self.edges[edge].clone())),
+            None => self.apart.contains(&(a, b)).then_some(None),
+        }
     }
 }
 
 /// Builds the graph over the patches that `reached` marks: each patch's nearest neighbours
 /// within the radius, in the union of both directions, joined where a surface line exists and
-/// some branch and redundancy value can be followed along it. `tick` is called once a candidate,
-/// `total` once with their number.
+/// some branch and redundancy value can be followed along it. What `before` found between the
+/// first patches, which must be the same, is taken over.
 #[must_use]
 pub fn build(
     cell: Workcell<'_>,
@@ -104,28 +140,29 @@ pub fn build(
     patches: &[Patch],
     reached: &[Option<Sample>],
     config: &GraphConfig,
-    total: &dyn Fn(usize),
-    tick: &(dyn Fn() + Sync),
+    before: Option<&Graph>,
+    progress: &dyn Progress,
 ) -> Graph {
     let pairs = neighbour_pairs(patches, reached, config);
-    total(pairs.len());
+    progress.stage("graph", Some(pairs.len()));
     let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
-    let edges: Vec<Edge> = pairs
+    let tried: Vec<Option<Edge>> = pairs
         .par_iter()
         .map(|&(a, b)| {
-            let edge = edge(surface, patches, a, b, config.line_step).and_then(|edge| {
+            let known = before.and_then(|graph| graph.known(a, b));
+            let edge = known.unwrap_or_else(|| {
+                let edge = Edge::between(surface, patches, a, b, config.line_step)?;
                 TURNS
                     .iter()
                     .map(|degrees| Edge { turn: f64::to_radians(*degrees), ..edge.clone() })
                     .find(|edge| can_be_followed(cell, patches, edge, &values))
             });
-            tick();
+            progress.tick();
             edge
         })
-        .collect::<Vec<_>>()
-        .into_iter()
-        .flatten()
         .collect();
+    let apart = pairs.iter().zip(&tried).filter(|(_, e)| e.is_none()).map(|(p, _)| *p).collect();
+    let edges: Vec<Edge> = tried.into_iter().flatten().collect();
 
     let mut incident = vec![Vec::new(); patches.len()];
     for (i, e) in edges.iter().enumerate() {
@@ -133,7 +170,7 @@ pub fn build(
         incident[e.b].push(i);
     }
     let components = components(&edges, &incident, reached);
-    Graph { edges, incident, components, candidates: pairs.len() }
+    Graph { edges, incident, components, candidates: pairs.len(), apart }
 }
 
 /// Pairs (a < b) of reachable patches of which one is among the other's nearest.
@@ -157,21 +194,6 @@ fn neighbour_pairs(
     pairs.sort_unstable();
     pairs.dedup();
     pairs
-}
-
-/// The surface line between two patches with its headings.
-fn edge(surface: &Surface, patches: &[Patch], a: usize, b: usize, step: f64) -> Option<Edge> {
-    let end = |i: usize| SurfacePoint { point: patches[i].centre, normal: patches[i].normal };
-    let line = surface.line(&end(a), &end(b), step)?;
-    let last = line.len() - 1;
-    Some(Edge {
-        a,
-        b,
-        heading_a: heading_of(&line[0].normal, &(line[1].point - line[0].point)),
-        heading_b: heading_of(&line[last].normal, &(line[last].point - line[last - 1].point)),
-        line,
-        turn: 0.0,
-    })
 }
 
 /// Whether one branch at one of the redundancy values can be followed along the edge, the pad

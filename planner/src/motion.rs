@@ -5,7 +5,7 @@ use nullsweep_robot::JointVector;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use crate::cost::{self, Cost};
-use crate::graph::Graph;
+use crate::graph::{Edge, Graph};
 use crate::layered::{Link, Motion, Moves};
 use crate::reach::{Sample, Workcell};
 use crate::track::ToolPath;
@@ -25,6 +25,15 @@ impl Leg {
     #[must_use]
     pub fn is_jump(&self) -> bool {
         self.line.iter().any(Option::is_none)
+    }
+
+    /// The same way back.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let mut back = self.clone();
+        back.joints.reverse();
+        back.line.reverse();
+        back
     }
 }
 
@@ -62,6 +71,24 @@ impl<'a, C: Cost> Mover<'a, C> {
         Self { cell, graph, stops, cost, source, lift: cost.of(&lift), seed }
     }
 
+    /// The motion along an edge, or `reversed` back, its joint vectors free of collision; `None`
+    /// where the branch cannot be followed.
+    #[must_use]
+    pub fn along(
+        &self,
+        edge: &Edge,
+        reversed: bool,
+        from: &Sample,
+        to: &Sample,
+    ) -> Option<Motion<Leg>> {
+        let stand_off = self.cell.tool.stand_off;
+        let path = ToolPath::along(edge, reversed, from.heading, to.heading, stand_off);
+        let track = self.cell.follow(&path, from, to).ok()?;
+        let cost = cost::of_path(self.cost, &track.joints);
+        let line = track.line.into_iter().map(Some).collect();
+        Some(Motion { cost, path: Leg { joints: track.joints, line } })
+    }
+
     /// A seed that depends on the two ends alone, not on when or on which thread it is asked for.
     fn seed_of(&self, from: &JointVector, to: &JointVector) -> u64 {
         let mut bytes = Vec::with_capacity(2 * size_of::<JointVector>());
@@ -85,13 +112,7 @@ impl<C: Cost> Moves for Mover<'_, C> {
 
     fn track(&self, link: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<Leg>> {
         let (edge, reversed) = link;
-        let edge = &self.graph.edges[edge];
-        let stand_off = self.cell.tool.stand_off;
-        let path = ToolPath::along(edge, reversed, from.heading, to.heading, stand_off);
-        let track = self.cell.follow(&path, from, to).ok()?;
-        let cost = cost::of_path(self.cost, &track.joints);
-        let line = track.line.into_iter().map(Some).collect();
-        Some(Motion { cost, path: Leg { joints: track.joints, line } })
+        self.along(&self.graph.edges[edge], reversed, from, to)
     }
 
     fn is_proven(&self, leg: &Leg) -> bool {

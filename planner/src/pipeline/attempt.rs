@@ -4,7 +4,7 @@ use nullsweep_robot::{JointVector, MAX_DOF, Robot};
 use rayon::prelude::*;
 
 use super::{Clock, Job, PipelineError};
-use crate::cost::{self, Cost, CostKind, Effort, TaskTime};
+use crate::cost::{Cost, CostKind, Effort, TaskTime};
 use crate::coverage;
 use crate::formulation::{self, Stop};
 use crate::graph::{self, Graph};
@@ -29,6 +29,8 @@ pub(super) struct Shop<'a> {
     pub(super) scan: &'a Scan,
     pub(super) surface: &'a Surface,
     pub(super) start: JointVector,
+    /// Of each joint. \[rad/s\] or \[m/s\]
+    pub(super) velocity: JointVector,
     /// The points of reachable patches.
     pub(super) to_sweep: &'a [bool],
     /// The points that were swept before the plan begins.
@@ -44,7 +46,7 @@ pub(super) struct Attempt {
     pub(super) sequence: Sequence,
     pub(super) plan: Plan,
     /// The points to sweep that are not swept.
-    left: Vec<bool>,
+    pub(super) left: Vec<bool>,
 }
 
 impl Attempt {
@@ -56,23 +58,35 @@ impl Attempt {
 
 /// The joint path of the whole tour.
 pub(super) struct Sequence {
-    /// One leg into each stop.
-    legs: Vec<(usize, Leg)>,
+    pub(super) visits: Vec<Visit>,
     pub(super) samples: usize,
-    pub(super) jumps: usize,
     pub(super) dropped: Vec<usize>,
 }
 
+/// A stop of the arm with the way to it.
+pub(super) struct Visit {
+    pub(super) patch: usize,
+    pub(super) sample: Sample,
+    pub(super) leg: Leg,
+}
+
+impl Sequence {
+    pub(super) fn jumps(&self) -> usize {
+        self.visits.iter().filter(|v| v.leg.is_jump()).count()
+    }
+}
+
 impl Shop<'_> {
-    /// A plan that visits the patches for which `visit` has a sample.
+    /// A plan that visits the patches for which `visit` has a sample; the first patches are those
+    /// of `before`.
     pub(super) fn attempt(
         &self,
         patches: Vec<Patch>,
         visit: Vec<Option<Sample>>,
+        before: Option<&Attempt>,
         clock: &mut Clock,
     ) -> Result<Attempt, PipelineError> {
         let Self { job, cell, progress, .. } = *self;
-        progress.stage("graph", None);
         let graph = clock.time("graph", || {
             graph::build(
                 cell,
@@ -80,8 +94,8 @@ impl Shop<'_> {
                 &patches,
                 &visit,
                 &job.graph,
-                &|total| progress.stage("graph", Some(total)),
-                &|| progress.tick(),
+                before.map(|b| &b.graph),
+                progress,
             )
         });
         progress.stage("tour", None);
@@ -98,18 +112,28 @@ impl Shop<'_> {
             )
         })?;
         progress.stage("layered graph and transfers", None);
-        let velocity = cost::velocities(cell.arm, job.v_max);
         let context = Context { shop: self, graph: &graph, patches: &patches, visit: &visit };
         let sequence = clock.time("layered", || match job.cost {
             CostKind::Effort => context.sequence(&Effort, &tour),
-            CostKind::Time => context.sequence(&TaskTime::new(&velocity), &tour),
+            CostKind::Time => context.sequence(&TaskTime::new(&self.velocity), &tour),
         })?;
-        let plan = self.assemble(&patches, &sequence, &velocity);
-        let poses = verify::contact_motion(&plan, cell.arm);
-        let swept = clock.time("coverage", || coverage::swept(self.scan, &poses, &job.tool));
-        let left =
-            (0..swept.len()).map(|i| self.to_sweep[i] && !swept[i] && !self.already[i]).collect();
+        let plan = self.assemble(&patches, &sequence);
+        let left = clock.time("coverage", || self.left(&plan));
         Ok(Attempt { patches, visit, graph, sequence, plan, left })
+    }
+
+    /// The points to sweep that the plan leaves out.
+    pub(super) fn left(&self, plan: &Plan) -> Vec<bool> {
+        let poses = verify::contact_motion(plan, self.cell.arm);
+        let swept = coverage::swept(self.scan, &poses, &self.job.tool);
+        (0..swept.len()).map(|i| self.to_sweep[i] && !swept[i] && !self.already[i]).collect()
+    }
+
+    /// Patches over what is left, at most as far across as the pad is wide: swept at any heading.
+    pub(super) fn fill_in(&self, left: &[bool]) -> Vec<Patch> {
+        let epsilon = self.job.patches.epsilon.min(0.5 * self.job.tool.width);
+        let config = PatchConfig { epsilon, ..self.job.patches.clone() };
+        patches::fill_in(self.scan, left, &config, self.job.tool.reach_angle)
     }
 
     /// The patches with others over what the attempt leaves out; `None` where nothing can be
@@ -120,9 +144,7 @@ impl Shop<'_> {
         clock: &mut Clock,
     ) -> Option<(Vec<Patch>, Vec<Option<Sample>>)> {
         self.progress.stage("fill in", None);
-        let config = PatchConfig { epsilon: self.fill_in_radius(), ..self.job.patches.clone() };
-        let angle = self.job.tool.reach_angle;
-        let extra = patches::fill_in(self.scan, &attempt.left, &config, angle);
+        let extra = self.fill_in(&attempt.left);
         let reached = clock.time("reach", || reach(self.cell, &extra, self.job.ik_samples, &|| ()));
         if !reached.iter().any(Option::is_some) {
             return None;
@@ -139,11 +161,6 @@ impl Shop<'_> {
         }
         Some((patches, visit))
     }
-
-    /// A pad over a fill-in patch sweeps all of it at any heading.
-    fn fill_in_radius(&self) -> f64 {
-        self.job.patches.epsilon.min(0.5 * self.job.tool.width)
-    }
 }
 
 /// What the layered search needs.
@@ -159,12 +176,8 @@ impl Context<'_> {
     /// left out.
     fn sequence<C: Cost>(&self, cost: &C, tour: &[Stop]) -> Result<Sequence, PipelineError> {
         let Shop { cell, job, start, progress, .. } = *self.shop;
-        let arm = cell.arm;
-        let mut continuous = [false; MAX_DOF];
-        for (c, limits) in continuous.iter_mut().zip(arm.limits()) {
-            *c = limits.continuous;
-        }
-        let values = redundancies(arm.ik().redundancy_range(), job.ik_samples);
+        let continuous = self.shop.continuous();
+        let values = redundancies(cell.arm.ik().redundancy_range(), job.ik_samples);
         let layers: Vec<Vec<Sample>> =
             tour.par_iter().map(|stop| self.layer(stop, &values)).collect();
         let stops: Vec<usize> = tour.iter().map(|stop| stop.patch).collect();
@@ -178,18 +191,18 @@ impl Context<'_> {
         if path.layers.is_empty() {
             return Err(PipelineError::NoMotion { reachable: tour.len() });
         }
-        let legs: Vec<(usize, Leg)> = path
+        let visits = path
             .layers
             .iter()
-            .map(|&layer| stops[layer])
-            .zip(path.motions.into_iter().map(|motion| motion.path))
+            .zip(&path.choice)
+            .zip(path.motions)
+            .map(|((&layer, &choice), motion)| Visit {
+                patch: stops[layer],
+                sample: layers[layer][choice],
+                leg: motion.path,
+            })
             .collect();
-        Ok(Sequence {
-            jumps: legs.iter().filter(|(_, leg)| leg.is_jump()).count(),
-            legs,
-            samples: layers.iter().map(Vec::len).sum(),
-            dropped,
-        })
+        Ok(Sequence { visits, samples: layers.iter().map(Vec::len).sum(), dropped })
     }
 
     /// All samples at a stop, or where it has none at the heading that reached the patch.
@@ -218,12 +231,21 @@ impl Context<'_> {
 }
 
 impl Shop<'_> {
+    /// Which joints turn without end.
+    pub(super) fn continuous(&self) -> [bool; MAX_DOF] {
+        let mut continuous = [false; MAX_DOF];
+        for (c, limits) in continuous.iter_mut().zip(self.cell.arm.limits()) {
+            *c = limits.continuous;
+        }
+        continuous
+    }
+
     /// Joins the legs, unwraps continuous joints and sets the times.
-    fn assemble(&self, patches: &[Patch], sequence: &Sequence, velocity: &JointVector) -> Plan {
+    pub(super) fn assemble(&self, patches: &[Patch], sequence: &Sequence) -> Plan {
         let Self { robot, job, stance, scan, .. } = *self;
         let arm = self.cell.arm;
         let mut knots: Vec<PlanKnot> = Vec::new();
-        for (patch, leg) in &sequence.legs {
+        for Visit { patch, leg, .. } in &sequence.visits {
             let shift = knots.last().map_or([0.0; MAX_DOF], |last| {
                 std::array::from_fn(|j| {
                     let turns = (last.q[j] - leg.joints[0][j]) / std::f64::consts::TAU;
@@ -250,7 +272,7 @@ impl Shop<'_> {
             same
         });
         let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
-        for (knot, time) in knots.iter_mut().zip(timing::bang_bang(&joints, velocity)) {
+        for (knot, time) in knots.iter_mut().zip(timing::bang_bang(&joints, &self.velocity)) {
             knot.time_ns = time;
         }
         Plan {

@@ -1,6 +1,7 @@
 //! The whole way from a scan to a verified plan, on one page.
 
 mod attempt;
+mod completion;
 mod setting;
 
 use std::collections::BTreeMap;
@@ -279,6 +280,7 @@ pub fn run(
         scan: &scan,
         surface: &surface,
         start,
+        velocity: cost::velocities(&arm, job.v_max),
         to_sweep: &to_sweep,
         already: &already,
         progress,
@@ -288,15 +290,16 @@ pub fn run(
     if job.after.as_ref().is_some_and(|after| !after.again) {
         leave_out_swept(&mut visit, &patches, &already);
     }
-    let mut best = shop.attempt(patches, visit, &mut clock)?;
+    let mut best = shop.attempt(patches, visit, None, &mut clock)?;
     for _ in 0..job.refinements {
         let Some((patches, visit)) = shop.refine(&best, &mut clock) else { break };
-        let next = shop.attempt(patches, visit, &mut clock)?;
+        let next = shop.attempt(patches, visit, Some(&best), &mut clock)?;
         if next.swept_points() <= best.swept_points() {
             break;
         }
         best = next;
     }
+    shop.complete(&mut best, &mut clock);
     let Attempt { patches, graph, sequence, plan, .. } = best;
 
     progress.stage("verify", Some(plan.knots.len().saturating_sub(1)));
@@ -321,7 +324,7 @@ pub fn run(
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
         knots: plan.knots.len(),
-        jumps: sequence.jumps,
+        jumps: sequence.jumps(),
         dropped_patches: sequence.dropped.len(),
         verification,
         seed: job.seed,

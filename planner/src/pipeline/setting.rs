@@ -8,6 +8,7 @@ use super::{Job, PipelineError, StanceChoice};
 use crate::collision::{Obstacle, ToolContact, World};
 use crate::graph::{self, GraphConfig};
 use crate::patches::Patch;
+use crate::progress::Silent;
 use crate::reach::{Workcell, reach};
 use crate::scan::Scan;
 use crate::stance::{self, Stance};
@@ -99,7 +100,7 @@ impl Setting {
         let reached = reach(cell, &self.patches, job.ik_samples, &|| ());
         let surface = Surface::new(&self.scan);
         let config = GraphConfig { edge_samples: 24, ..job.graph };
-        let graph = graph::build(cell, &surface, &self.patches, &reached, &config, &|_| (), &|| ());
+        let graph = graph::build(cell, &surface, &self.patches, &reached, &config, None, &Silent);
         let score = (0..self.patches.len())
             .filter(|&i| reached[i].is_some())
             .map(|i| self.patches[i].points.len() * (1 + graph.incident[i].len().min(WELL_JOINED)))

@@ -1,0 +1,248 @@
+//! Side trips to what the tour leaves out: slivers between patches, and patches into which the
+//! layered search found no motion.
+//!
+//! A side trip follows the surface from a stop nearby and comes back the same way. Where none
+//! goes, a jump is put in between two stops that a jump joins anyway, or at the end, where it is
+//! the least detour (cheapest insertion).
+
+use std::collections::HashSet;
+
+use nullsweep_robot::JointVector;
+use rayon::prelude::*;
+
+use super::attempt::{Attempt, Shop, Visit};
+use super::{Clock, SWEPT_SHARE};
+use crate::cost::{Cost, CostKind, Effort, TaskTime, displacement};
+use crate::coverage;
+use crate::formulation::{Stop, pose};
+use crate::graph::Edge;
+use crate::layered::{Motion, Moves};
+use crate::motion::{Leg, Mover};
+use crate::patches::Patch;
+use crate::reach::{Sample, redundancies};
+
+/// Times that patches are put over what is left: a side trip may leave slivers of its own.
+const ROUNDS: usize = 3;
+/// Stops nearby that a side trip is tried from.
+const STOPS: usize = 8;
+/// Samples that a side trip from one stop is tried to, nearest redundancy value first.
+const TARGETS: usize = 12;
+/// Headings that a jump is tried to.
+const HEADINGS: usize = 4;
+/// Jumps that are tried to one patch, least detour first, so many side by side.
+const JUMPS: usize = 24;
+const BATCH: usize = 4;
+
+impl Shop<'_> {
+    /// Adds visits to what the attempt has left out, as far as motions there are found.
+    pub(super) fn complete(&self, attempt: &mut Attempt, clock: &mut Clock) {
+        self.progress.stage("side trips", None);
+        clock.time("side trips", || match self.job.cost {
+            CostKind::Effort => Completion { shop: self, cost: &Effort }.run(attempt),
+            CostKind::Time => {
+                Completion { shop: self, cost: &TaskTime::new(&self.velocity) }.run(attempt);
+            }
+        });
+        let Attempt { patches, sequence, left, .. } = attempt;
+        sequence.dropped.retain(|&patch| {
+            let points = &patches[patch].points;
+            let swept = points.iter().filter(|&&i| !left[i as usize]).count();
+            (swept as f64) < SWEPT_SHARE * points.len() as f64
+        });
+    }
+}
+
+struct Completion<'a, C> {
+    shop: &'a Shop<'a>,
+    cost: &'a C,
+}
+
+impl<C: Cost> Completion<'_, C> {
+    fn run(&self, attempt: &mut Attempt) {
+        for _ in 0..ROUNDS {
+            let mut gained = false;
+            let mut left = attempt.left.clone();
+            for patch in self.shop.fill_in(&attempt.left) {
+                // A side trip sweeps more than the patch that it was made for.
+                let open = patch.points.iter().filter(|&&i| left[i as usize]).count();
+                if open < self.shop.job.patches.min_points {
+                    continue;
+                }
+                attempt.patches.push(patch);
+                let Some(at) = self.visit(attempt) else {
+                    attempt.patches.pop();
+                    continue;
+                };
+                gained = true;
+                self.sweep(&attempt.sequence.visits[at].leg, &mut left);
+            }
+            if !gained {
+                return;
+            }
+            attempt.plan = self.shop.assemble(&attempt.patches, &attempt.sequence);
+            attempt.left = self.shop.left(&attempt.plan);
+        }
+    }
+
+    /// Takes out what the leg sweeps.
+    fn sweep(&self, leg: &Leg, left: &mut [bool]) {
+        let Shop { cell, scan, job, .. } = self.shop;
+        let contact = job.tool.contact_in_tip();
+        let poses: Vec<_> = leg.joints.iter().map(|q| cell.arm.tip_pose(q) * contact).collect();
+        for (left, swept) in left.iter_mut().zip(coverage::swept(scan, &poses, &job.tool)) {
+            *left &= !swept;
+        }
+    }
+
+    /// Puts visits of the last patch into the sequence; their first index, `None` where no motion
+    /// there is found.
+    fn visit(&self, attempt: &mut Attempt) -> Option<usize> {
+        let Shop { cell, job, start, .. } = *self.shop;
+        let patch = attempt.patches.len() - 1;
+        let mover = Mover::new(cell, &attempt.graph, &[], self.cost, start, job.seed);
+        let trip = Trip {
+            shop: self.shop,
+            cost: self.cost,
+            mover,
+            patches: &attempt.patches,
+            visits: &attempt.sequence.visits,
+            patch,
+            values: redundancies(cell.arm.ik().redundancy_range(), job.ik_samples),
+        };
+        let (at, there, after) = trip.along_the_surface().or_else(|| trip.through_free_space())?;
+        let visits = &mut attempt.sequence.visits;
+        match after {
+            After::Back(back) => {
+                let stop = &visits[at - 1];
+                let back = Visit { patch: stop.patch, sample: stop.sample, leg: back };
+                visits.splice(at..at, [there, back]);
+            }
+            After::On(leg) => {
+                visits[at].leg = leg;
+                visits.insert(at, there);
+            }
+            After::End => visits.push(there),
+        }
+        Some(at)
+    }
+}
+
+/// How the arm goes on from a side trip.
+enum After {
+    /// To the stop that it came from.
+    Back(Leg),
+    /// To the next stop, by this leg instead of the one it had.
+    On(Leg),
+    /// Not at all: it was the last one.
+    End,
+}
+
+/// The search for motions to one patch.
+struct Trip<'a, C> {
+    shop: &'a Shop<'a>,
+    cost: &'a C,
+    mover: Mover<'a, C>,
+    patches: &'a [Patch],
+    visits: &'a [Visit],
+    /// Where to.
+    patch: usize,
+    /// Redundancy values to try. \[rad\]
+    values: Vec<f64>,
+}
+
+impl<C: Cost> Trip<'_, C> {
+    /// The cheapest way from a stop nearby and back: the place of the new visit, the visit, and
+    /// the way on.
+    fn along_the_surface(&self) -> Option<(usize, Visit, After)> {
+        let centre = self.patches[self.patch].centre;
+        let mut near: Vec<(f64, usize)> = self
+            .visits
+            .iter()
+            .enumerate()
+            .map(|(i, v)| ((self.patches[v.patch].centre - centre).norm(), i))
+            .filter(|&(distance, _)| distance > 1e-6 && distance <= self.shop.job.graph.radius)
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.truncate(STOPS);
+        let found: Vec<Option<(usize, Sample, Motion<Leg>)>> =
+            near.par_iter().map(|&(_, i)| self.reach_from(i).map(|(s, m)| (i, s, m))).collect();
+        let (stop, sample, motion) =
+            found.into_iter().flatten().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost))?;
+        let back = motion.path.reversed();
+        let visit = Visit { patch: self.patch, sample, leg: motion.path };
+        Some((stop + 1, visit, After::Back(back)))
+    }
+
+    /// A way along the surface from one stop, the pad turned from the line as it is there.
+    fn reach_from(&self, stop: usize) -> Option<(Sample, Motion<Leg>)> {
+        let Shop { cell, job, surface, .. } = self.shop;
+        let Visit { patch, sample: from, .. } = &self.visits[stop];
+        let edge = Edge::between(surface, self.patches, *patch, self.patch, job.graph.line_step)?;
+        let heading = edge.heading_b + from.heading - edge.heading_a;
+        let mut targets: Vec<Sample> = self.samples(heading);
+        targets.retain(|to| to.branch == from.branch);
+        let apart = |to: &Sample| (to.redundancy - from.redundancy).abs();
+        targets.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
+        targets.iter().take(TARGETS).find_map(|to| {
+            let motion = self.mover.along(&edge, false, from, to)?;
+            cell.is_proven(&motion.path.joints).then_some((*to, motion))
+        })
+    }
+
+    /// A jump to the patch and one from there on, in place of a jump or at the end.
+    fn through_free_space(&self) -> Option<(usize, Visit, After)> {
+        let continuous = self.shop.continuous();
+        let straight = |from: &JointVector, to: &JointVector| {
+            self.cost.of(&displacement(&continuous, from, to))
+        };
+        let before = |at: usize| at.checked_sub(1).map(|b| &self.visits[b].sample);
+        let q_before = |at: usize| before(at).map_or(&self.shop.start, |s| &s.q);
+        let places: Vec<usize> = (0..self.visits.len())
+            .filter(|&at| self.visits[at].leg.is_jump())
+            .chain([self.visits.len()])
+            .collect();
+        let turn = if self.shop.job.tool.symmetric { 0.5 } else { 1.0 } * std::f64::consts::TAU;
+        let mut choices: Vec<(f64, usize, Sample)> = (0..HEADINGS)
+            .flat_map(|h| self.samples(turn * h as f64 / HEADINGS as f64))
+            .flat_map(|sample| places.iter().map(move |&at| (at, sample)))
+            .map(|(at, sample)| {
+                let q = &sample.q;
+                let detour = match self.visits.get(at).map(|next| &next.sample.q) {
+                    None => straight(q_before(at), q),
+                    Some(next) => {
+                        straight(q_before(at), q) + straight(q, next) - straight(q_before(at), next)
+                    }
+                };
+                (detour, at, sample)
+            })
+            .collect();
+        choices.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // The best place of each sample is enough, and a sample that cannot be lifted off is none.
+        let mut seen = HashSet::new();
+        choices.retain(|(_, _, s)| seen.insert(s.q.map(f64::to_bits)));
+        choices.truncate(JUMPS);
+        choices.chunks(BATCH).find_map(|batch| {
+            let made: Vec<_> = batch
+                .par_iter()
+                .map(|(_, at, sample)| {
+                    let there = self.mover.jump(before(*at), sample)?.path;
+                    let after = match self.visits.get(*at) {
+                        None => After::End,
+                        Some(next) => After::On(self.mover.jump(Some(sample), &next.sample)?.path),
+                    };
+                    Some((*at, Visit { patch: self.patch, sample: *sample, leg: there }, after))
+                })
+                .collect();
+            made.into_iter().flatten().next()
+        })
+    }
+
+    /// All samples at the patch at one heading.
+    fn samples(&self, heading: f64) -> Vec<Sample> {
+        let Shop { cell, job, .. } = self.shop;
+        let contact = pose(self.patches, &job.tool, &Stop { patch: self.patch, heading });
+        let mut samples = Vec::new();
+        cell.samples(&contact, heading, &self.values, &mut samples);
+        samples
+    }
+}
