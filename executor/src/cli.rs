@@ -72,7 +72,8 @@ struct RunArgs {
     /// Pin the loop to this CPU.
     #[arg(long)]
     cpu: Option<usize>,
-    /// SCHED_FIFO priority of the loop; 0 leaves it to the default scheduler.
+    /// SCHED_FIFO priority of the loop; the other threads get one of at most 5. 0 leaves all to
+    /// the default scheduler.
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
     priority: u8,
     /// Spin the last microseconds before each deadline, where SCHED_FIFO is granted. Default: 75,
@@ -263,7 +264,7 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
 fn replay_command(file: &Path) -> anyhow::Result<ExitCode> {
     let replayed = replay(file)?;
     for (cycle, event) in &replayed.events {
-        println!("cycle {cycle}: plan {} {}: {}", event.plan, event.kind, event.why);
+        println!("cycle {cycle}: {event}");
     }
     println!(
         "{} cycles, {} setpoints, all the same to the bit; {} bytes of a torn record left out",

@@ -10,8 +10,6 @@ use crate::admit::ValidPlan;
 use crate::guard::Guard;
 use crate::interpolate::{PlanKnot, Sample, sample};
 
-/// Knots passed one by one before the next one is searched for.
-const WALK: usize = 32;
 /// Cycles after which a predicted stop is given up: the slowest ramp takes 1,000 at 1 kHz.
 const PREDICTION_CYCLES: usize = 20_000;
 
@@ -152,15 +150,17 @@ impl Path {
 
     /// The segment of a path time, sought from an earlier segment on.
     fn segment(&self, from: usize, time: f64) -> usize {
-        let knots = self.plan.knots();
-        let last = knots.len().saturating_sub(2);
-        let from = from.min(last);
-        for segment in from..from + WALK {
-            if segment >= last || time < knots[segment + 1].time {
-                return segment;
-            }
+        let times = self.plan.times();
+        let last = times.len().saturating_sub(2);
+        let mut low = from.min(last);
+        // In growing strides, as it is nearly always this segment or the next one.
+        let mut stride = 1;
+        while low + stride <= last && times[low + stride] <= time {
+            low += stride;
+            stride *= 2;
         }
-        knots.partition_point(|k| k.time <= time).saturating_sub(1).min(last)
+        let end = (low + stride).min(last + 1);
+        low + times.get(low + 1..end).map_or(0, |ahead| ahead.partition_point(|t| *t <= time))
     }
 
     fn sample_at(&self, at: Progress) -> Sample {

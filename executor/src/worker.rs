@@ -96,7 +96,7 @@ impl<'a> Worker<'a> {
 
         let start = Instant::now();
         let admitted = admit(&header, &self.copy, self.held.as_ref(), &self.rules, now_ns());
-        let result = admitted.and_then(|plan| {
+        let result = admitted.map(|plan| plan.checked(now_ns())).and_then(|plan| {
             tracing::info!(
                 "plan {}: {} knots, {:.1} s, checked in {:.2} ms",
                 header.id,

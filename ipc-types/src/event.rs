@@ -70,7 +70,8 @@ wire_enum! {
 }
 
 /// One step in the life of a plan. For a rejection, `joint`, `knot`, `value` and `bound` say
-/// where and by how much.
+/// where and by how much; for an acceptance, `value` is the time from the publication to the end
+/// of the check. \[s\]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("nullsweep.PlanEvent.v1")]

@@ -48,17 +48,35 @@ pub struct ValidPlan {
     join: Join,
     interpolation: Interpolation,
     knots: Vec<PlanKnot>,
+    /// The knots' times once more, close together, to be searched.
+    times: Vec<f64>,
+    waited: f64,
 }
 
 impl ValidPlan {
-    /// A plan that was admitted before it was recorded.
-    pub(crate) fn recorded(
+    /// A plan that was checked.
+    pub(crate) fn new(
         id: PlanId,
         join: Join,
         interpolation: Interpolation,
         knots: Vec<PlanKnot>,
+        waited: f64,
     ) -> Self {
-        Self { id, join, interpolation, knots }
+        let times = knots.iter().map(|k| k.time).collect();
+        Self { id, join, interpolation, knots, times, waited }
+    }
+
+    /// The time from its publication to the end of its check, which the loop tells with its
+    /// acceptance. \[s\]
+    #[must_use]
+    pub fn waited(&self) -> f64 {
+        self.waited
+    }
+
+    /// Notes that the check is done.
+    pub(crate) fn checked(mut self, now_ns: u64) -> Self {
+        self.waited = now_ns.saturating_sub(self.id.epoch) as f64 * 1e-9;
+        self
     }
 
     /// Names it.
@@ -83,6 +101,11 @@ impl ValidPlan {
     #[must_use]
     pub fn knots(&self) -> &[PlanKnot] {
         &self.knots
+    }
+
+    /// The knots' times. \[ns\]
+    pub(crate) fn times(&self) -> &[f64] {
+        &self.times
     }
 
     /// How long it takes at full speed. \[ns\]
@@ -202,7 +225,7 @@ pub fn admit(
         return Err(Rejection::new(Reason::Robot).value(value, bound));
     }
     check_held(header, held, rules)?;
-    let mut plan = ValidPlan { id: header.id, join, interpolation, knots: read(knots, joints)? };
+    let mut plan = ValidPlan::new(header.id, join, interpolation, read(knots, joints)?, 0.0);
     check_motion(&plan, &rules.guard)?;
     check_end(&plan, &rules.guard)?;
     set_ramps(&mut plan, &rules.guard);

@@ -100,6 +100,19 @@ pub struct Event {
     pub why: Rejection,
 }
 
+impl core::fmt::Display for Event {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "plan {} {}", self.plan, self.kind)?;
+        match self.kind {
+            EventKind::Accepted => {
+                write!(f, " {:.2} ms after it was published", self.why.value * 1e3)
+            }
+            _ if self.why.reason == Reason::None => Ok(()),
+            _ => write!(f, ": {}", self.why),
+        }
+    }
+}
+
 /// A plan that waits its turn.
 #[derive(Clone, Debug)]
 struct Waiting {
@@ -227,6 +240,12 @@ impl State {
             commanded: self.q,
             measured: self.watch.measured().map_or([0.0; MAX_DOF], |m| m.q),
         }
+    }
+
+    /// The number of the last setpoint.
+    #[must_use]
+    pub fn sequence(&self) -> u64 {
+        self.sequence
     }
 
     /// Whether a shutdown was ordered and the arm stands still with its motors asked off.

@@ -33,7 +33,8 @@ impl State {
                 return;
             }
         };
-        out.tell(id, EventKind::Accepted, Rejection::new(Reason::None));
+        let waited = Rejection::new(Reason::None).value(plan.waited(), f64::NAN);
+        out.tell(id, EventKind::Accepted, waited);
         self.fault = Fault::None;
         let Some(turn) = turn else {
             self.begin(plan, self.scale, guard, out);

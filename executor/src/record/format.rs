@@ -15,7 +15,7 @@ use crate::interpolate::PlanKnot;
 use crate::{Joints, MAX_DOF};
 
 /// The first bytes of a recording; the digit is the version.
-pub(crate) const MAGIC: &[u8; 8] = b"NSWREC1\n";
+pub(crate) const MAGIC: &[u8; 8] = b"NSWREC2\n";
 
 /// What a record holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,6 +142,8 @@ pub(crate) struct PlanRecord {
     /// 0 stop, 1 after, 2 knot.
     join: u32,
     interpolation: u32,
+    /// See [`ValidPlan::waited`].
+    waited: f64,
 }
 
 impl From<&ValidPlan> for PlanRecord {
@@ -152,7 +154,8 @@ impl From<&ValidPlan> for PlanRecord {
             Join::Knot { plan, knot } => (2, plan, knot as u64),
         };
         let interpolation = plan.interpolation().wire();
-        Self { id: plan.id(), join_plan, join_knot, join, interpolation }
+        let (id, waited) = (plan.id(), plan.waited());
+        Self { id, join_plan, join_knot, join, interpolation, waited }
     }
 }
 
@@ -170,7 +173,8 @@ pub(crate) fn plan(payload: &[u8]) -> Option<ValidPlan> {
         2 => Join::Knot { plan: head.join_plan, knot: head.join_knot as usize },
         _ => return None,
     };
-    Some(ValidPlan::recorded(head.id, join, Interpolation::from_wire(head.interpolation)?, knots))
+    let interpolation = Interpolation::from_wire(head.interpolation)?;
+    Some(ValidPlan::new(head.id, join, interpolation, knots, head.waited))
 }
 
 /// One cycle: what [`crate::cycle::step`] got, and the setpoint that it gave.
