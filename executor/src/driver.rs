@@ -12,14 +12,16 @@ use nullsweep_ipc_types::{
 };
 
 use crate::MAX_DOF;
-use crate::admit::Held;
-use crate::cycle::{HELD_MOVED, Input, Measured, State, Target, step};
+use crate::admit::{Held, ValidPlan};
+use crate::cycle::{Ask, HELD_MOVED, Input, Measured, State, Target, step};
 use crate::guard::Guard;
 use crate::hardware::Hardware;
 use crate::record::Tape;
 use crate::rt::Wake;
 use crate::slots::{Report, Slots};
 
+/// Setpoints whose round trip is told.
+const MADE: usize = 64;
 /// Cycles between two reports.
 const REPORT_EVERY: u64 = 10;
 
@@ -35,9 +37,23 @@ pub struct Driver<H> {
     reference: Option<Held>,
     lateness: [u32; HISTOGRAM_BUCKETS],
     compute: [u32; HISTOGRAM_BUCKETS],
+    round_trip: [u32; HISTOGRAM_BUCKETS],
+    /// When the last setpoints were made, by their sequence. \[ns\]
+    made: [u64; MADE],
+    /// The newest of them that the endpoint is known to have had.
+    heard: u64,
+    early: Early,
     cycles: u64,
     /// Reads and writes that failed.
     failures: u64,
+}
+
+/// What came for the next cycle.
+#[derive(Debug, Default)]
+struct Early {
+    states: Option<JointStates>,
+    ask: Option<Ask>,
+    offer: Option<Arc<ValidPlan>>,
 }
 
 impl<H: Hardware> Driver<H> {
@@ -52,6 +68,10 @@ impl<H: Hardware> Driver<H> {
             reference: None,
             lateness: [0; HISTOGRAM_BUCKETS],
             compute: [0; HISTOGRAM_BUCKETS],
+            round_trip: [0; HISTOGRAM_BUCKETS],
+            made: [0; MADE],
+            heard: 0,
+            early: Early::default(),
             cycles: 0,
             failures: 0,
         }
@@ -91,36 +111,68 @@ impl<H: Hardware> Driver<H> {
         self.state.snapshot().mode
     }
 
+    /// Goes through a cycle shortly before its deadline, on a copy of the loop's memory, so that
+    /// code and data are in the caches when it counts: a thread that sleeps for most of a
+    /// millisecond finds them cold. Nothing is commanded; what waits for the cycle is taken out of
+    /// its queue and kept.
+    pub fn rehearse(&mut self, deadline_ns: u64) {
+        self.hardware.prepare();
+        self.gather();
+        let Early { states, ask, offer } = &self.early;
+        let measured = states.as_ref().map(measured);
+        let input = Input { measured, ask: *ask, offer: offer.clone(), missed: 0 };
+        // `step` has no effect but on what it is given. A plan that the copy retires is not freed
+        // here: the loop's own memory, or `early`, still holds it.
+        std::hint::black_box(step(&mut self.state.clone(), input, deadline_ns, &self.guard));
+    }
+
+    /// Takes what waits for the next cycle.
+    fn gather(&mut self) {
+        if let Some(states) = self.read() {
+            self.early.states = Some(states);
+        }
+        if self.early.ask.is_none() {
+            self.early.ask = self.slots.asks.pop();
+        }
+        if self.early.offer.is_none() && self.slots.has_room_for_events() {
+            self.early.offer = self.slots.offers.pop();
+        }
+    }
+
+    fn read(&mut self) -> Option<JointStates> {
+        self.hardware.read().unwrap_or_else(|_| {
+            self.failures += 1;
+            None
+        })
+    }
+
     /// Runs one cycle.
     pub fn cycle(&mut self, wake: Wake) {
         self.cycles += 1;
-        let states = self.hardware.read().unwrap_or_else(|_| {
-            self.failures += 1;
-            None
-        });
+        self.gather();
+        let Early { states, ask, offer } = std::mem::take(&mut self.early);
+        let tell_held = self.mode() == Mode::Init || self.cycles.is_multiple_of(REPORT_EVERY);
         let measured = states.as_ref().map(|states| {
             let held = held(states);
-            // Each cycle, so that the worker has them before anybody can have seen Hold.
-            self.slots.held.force_push(held);
+            // Each cycle at first, so that the worker has them before anybody can have seen Hold.
+            if tell_held {
+                self.slots.held.force_push(held);
+            }
             let mut measured = measured(states);
             if self.has_moved(held) {
                 measured.status |= HELD_MOVED;
             }
             measured
         });
-        let room = self.slots.has_room_for_events();
-        let input = Input {
-            measured,
-            ask: self.slots.asks.pop(),
-            offer: if room { self.slots.offers.pop() } else { None },
-            missed: wake.missed,
-        };
+        let input = Input { measured, ask, offer, missed: wake.missed };
+        self.count_round_trip(states.as_ref(), wake.now_ns);
         let record = self.tape.is_some().then(|| Tape::input(&input, wake.now_ns));
         let out = step(&mut self.state, input, wake.now_ns, &self.guard);
-        if let Some(target) = &out.setpoint
-            && self.hardware.write(&self.setpoint(target, wake)).is_err()
-        {
-            self.failures += 1;
+        if let Some(target) = &out.setpoint {
+            self.made[(target.sequence % MADE as u64) as usize] = wake.now_ns;
+            if self.hardware.write(&self.setpoint(target, wake)).is_err() {
+                self.failures += 1;
+            }
         }
         if let (Some(tape), Some(record)) = (&self.tape, record) {
             tape.push(record, out.setpoint.as_ref(), &self.state);
@@ -144,6 +196,7 @@ impl<H: Hardware> Driver<H> {
                 snapshot: self.state.snapshot(),
                 lateness: self.lateness,
                 compute: self.compute,
+                round_trip: self.round_trip,
             });
         }
     }
@@ -157,6 +210,17 @@ impl<H: Hardware> Driver<H> {
             count(&mut self.lateness, late);
         }
         count(&mut self.compute, done.saturating_sub(wake.now_ns));
+    }
+
+    /// Counts how long ago the newest setpoint was made that the endpoint says it has had, once.
+    fn count_round_trip(&mut self, states: Option<&JointStates>, now_ns: u64) {
+        let Some(heard) = states.map(|s| s.setpoint_sequence) else { return };
+        let newest = self.state.sequence();
+        if heard > self.heard && heard <= newest && newest - heard < MADE as u64 {
+            let made_ns = self.made[(heard % MADE as u64) as usize];
+            count(&mut self.round_trip, now_ns.saturating_sub(made_ns));
+        }
+        self.heard = heard;
     }
 
     /// Whether a held joint has moved since the motion began.
@@ -237,6 +301,7 @@ mod tests {
     use nullsweep_ipc_types::{EventKind, Fault, JoinRule, Reason, status};
 
     use super::*;
+    use crate::cycle::Order;
     use crate::guard::tests::pr2;
     use crate::hardware::Loopback;
     use crate::testing::{HOME, MS, moved, plan};
@@ -278,5 +343,52 @@ mod tests {
             }
             assert_eq!(driver.mode(), Mode::Hold, "{by}");
         }
+    }
+
+    /// A rehearsal leaves no trace: the same setpoints, events and answers with it as without.
+    #[test]
+    fn a_rehearsed_loop_does_the_same() {
+        let run = |rehearsed: bool| {
+            let guard = pr2();
+            let slots = Arc::new(Slots::default());
+            let mut states = JointStates {
+                joint_count: 7,
+                status: status::CALIBRATED,
+                stamp_ns: 1,
+                ..JointStates::zeroed()
+            };
+            states.positions[..MAX_DOF].copy_from_slice(&HOME);
+            let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
+            let (mut seen, mut replies) = (Vec::new(), Vec::new());
+            for cycle in 1..1100 {
+                match cycle {
+                    20 | 300 => {
+                        let (near, far) = (HOME, moved(HOME, 0, 0.4));
+                        let (from, to) = if cycle == 20 { (near, far) } else { (far, near) };
+                        let points = [(0, from), (400 * MS, to)];
+                        let plan = plan(&guard, cycle, JoinRule::AfterCurrent, &points);
+                        slots.offers.push(plan).unwrap();
+                    }
+                    100 => slots.asks.push(Ask { ticket: 1, order: Order::Pause }).unwrap(),
+                    200 => slots.asks.push(Ask { ticket: 2, order: Order::Resume }).unwrap(),
+                    _ => {}
+                }
+                let wake = Wake { deadline_ns: cycle * MS, now_ns: cycle * MS, missed: 0 };
+                if rehearsed {
+                    driver.rehearse(wake.deadline_ns);
+                    driver.rehearse(wake.deadline_ns);
+                }
+                driver.cycle(wake);
+                seen.push(driver.hardware().state);
+                replies.extend(std::iter::from_fn(|| slots.replies.pop()));
+            }
+            let events: Vec<_> = std::iter::from_fn(|| slots.events.pop())
+                .map(|e| (e.plan, e.kind, e.why.reason))
+                .collect();
+            (seen, replies, events)
+        };
+        let (rehearsed, plain) = (run(true), run(false));
+        assert_eq!(rehearsed, plain);
+        assert!(plain.2.len() == 6 && plain.1.len() == 2, "{:?}", plain.2);
     }
 }

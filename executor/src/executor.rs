@@ -27,6 +27,8 @@ const SHUTDOWN_TICKET: u64 = u64::MAX;
 const AFTERGLOW: u32 = 50;
 /// Cycles from the first Hold until the loop counts as armed: by then every port and page was used.
 const WARM_UP: u32 = 200;
+/// Highest `SCHED_FIFO` priority of worker and service: above what is not real-time, below what is.
+const HELPERS: u8 = 5;
 /// How long a shutdown may take before the threads are left behind.
 const SHUTDOWN_WITHIN: Duration = Duration::from_secs(5);
 
@@ -41,7 +43,8 @@ pub struct Config {
     pub guard: Guard,
     /// How far a held joint may be from where a plan takes it. \[rad\] or \[m\]
     pub held_tolerance: f64,
-    /// `SCHED_FIFO` priority of the loop, 0 for the default scheduler.
+    /// `SCHED_FIFO` priority of the loop, 0 for the default scheduler. Worker and service get one
+    /// of at most 5.
     pub priority: u8,
     /// The CPU that the loop is pinned to.
     pub cpu: Option<usize>,
@@ -128,6 +131,7 @@ pub fn quantile_ns(histogram: &[u32; HISTOGRAM_BUCKETS], share: f64) -> Option<u
 /// # Errors
 /// When a port is taken or cannot be opened, or a thread died.
 pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, ExecutorError> {
+    rt::keep_heap();
     let rules = rules(arm, config)?;
     let slots = Arc::new(Slots::default());
     let tape = config.record.as_ref().map(|_| Arc::new(Tape::default()));
@@ -137,6 +141,7 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
     let open_ports = AtomicU32::new(0);
     thread::scope(|scope| {
         let worker = spawn(scope, "worker", || {
+            rt::raise(helper_priority(config));
             let ipc = open(config)?;
             let worker = Worker::open(&ipc, slots.clone(), rules, recorder)?;
             open_ports.fetch_add(1, Ordering::Release);
@@ -144,6 +149,7 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
             Ok(())
         })?;
         let service = spawn(scope, "service", || {
+            rt::raise(helper_priority(config));
             let ipc = open(config)?;
             let service = Service::open(&ipc, slots.clone(), arm.dof())?;
             open_ports.fetch_add(1, Ordering::Release);
@@ -211,7 +217,7 @@ fn run_loop<H: Hardware>(
     let mut armed: Option<(u64, i64)> = None;
     let mut summary = Summary::default();
     while afterglow < AFTERGLOW && !done.load(Ordering::Acquire) {
-        let wake = grid.wait();
+        let wake = grid.wait(|deadline_ns| driver.rehearse(deadline_ns));
         driver.cycle(wake);
         driver.account(wake);
         summary.cycles += 1;
@@ -244,6 +250,12 @@ fn run_loop<H: Hardware>(
 fn faults() -> i64 {
     let (minor, major) = rt::page_faults();
     minor + major
+}
+
+/// The worker and the service sleep most of the time, but a plan or a command shall not wait for
+/// whatever else runs on the machine.
+fn helper_priority(config: &Config) -> u8 {
+    config.priority.min(HELPERS)
 }
 
 fn rules(arm: &Arm, config: &Config) -> Result<Rules, ExecutorError> {

@@ -1,6 +1,6 @@
 //! The hardware endpoint as the loop sees it.
 
-use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError, Receiver, Sender};
+use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError, Receiver, Sender, now_ns};
 use nullsweep_ipc_types::{JointStates, Setpoint};
 
 /// Something that measures joints and follows setpoints. Neither call may block.
@@ -16,6 +16,10 @@ pub trait Hardware {
     /// # Errors
     /// When it could not be handed over.
     fn write(&mut self, setpoint: &Setpoint) -> Result<(), PortError>;
+
+    /// Shortly before a cycle, where there is time: does of the next write what can be done
+    /// before its content is known. It may be left out, and may come several times.
+    fn prepare(&mut self) {}
 }
 
 /// An endpoint in another process.
@@ -41,7 +45,13 @@ impl Hardware for IpcHardware {
     }
 
     fn write(&mut self, setpoint: &Setpoint) -> Result<(), PortError> {
-        self.setpoints.send(setpoint).map(|_| ())
+        let stamped = Setpoint { stamp_ns: now_ns(), ..*setpoint };
+        self.setpoints.send(&stamped).map(|_| ())
+    }
+
+    fn prepare(&mut self) {
+        // What fails here fails again at the send, which counts it.
+        let _ = self.setpoints.prepare();
     }
 }
 

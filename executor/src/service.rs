@@ -104,6 +104,7 @@ impl Service {
             measured: widen(&snapshot.measured),
             lateness: report.lateness,
             compute: report.compute,
+            round_trip: report.round_trip,
             joint_count: self.joint_count.min(MAX_JOINTS) as u32,
             mode: snapshot.mode.wire(),
             fault: snapshot.fault.wire(),

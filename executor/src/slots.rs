@@ -64,4 +64,6 @@ pub struct Report {
     pub lateness: [u32; HISTOGRAM_BUCKETS],
     /// Compute time a cycle.
     pub compute: [u32; HISTOGRAM_BUCKETS],
+    /// From a setpoint to the cycle that reads that the endpoint had it.
+    pub round_trip: [u32; HISTOGRAM_BUCKETS],
 }

@@ -14,7 +14,7 @@ use crate::{JointArray, PlanId, assert_layout};
 pub struct Setpoint {
     /// Rises by one each cycle. A reader that skips samples judges steps by v·T·Δsequence.
     pub sequence: u64,
-    /// When the executor made it. \[ns\]
+    /// When the executor sent it. \[ns\]
     pub stamp_ns: u64,
     /// When the next one is due. \[ns\]
     pub deadline_ns: u64,

@@ -72,7 +72,7 @@ pub const fn bucket_upper_ns(bucket: usize) -> u64 {
 /// A snapshot of the executor, about 100 Hz.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
-#[type_name("nullsweep.Telemetry.v1")]
+#[type_name("nullsweep.Telemetry.v2")]
 pub struct Telemetry {
     /// Rises by one each sample.
     pub sequence: u64,
@@ -96,6 +96,9 @@ pub struct Telemetry {
     pub lateness: [u32; HISTOGRAM_BUCKETS],
     /// Histogram of compute time a cycle.
     pub compute: [u32; HISTOGRAM_BUCKETS],
+    /// Histogram of the time from a setpoint to the cycle that first reads a state in which the
+    /// endpoint says that it had it.
+    pub round_trip: [u32; HISTOGRAM_BUCKETS],
     /// How many joints are used.
     pub joint_count: u32,
     /// A [`Mode`] on the wire.
@@ -105,4 +108,4 @@ pub struct Telemetry {
     /// The knot whose segment is being executed.
     pub knot: u32,
 }
-assert_layout!(Telemetry, 592);
+assert_layout!(Telemetry, 720);

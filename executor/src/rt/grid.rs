@@ -12,6 +12,9 @@ pub struct Grid {
     spin: u64,
 }
 
+/// Time before a deadline that is not given away. \[ns\]
+const RESERVE: u64 = 30_000;
+
 /// One wake-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wake {
@@ -41,9 +44,10 @@ impl Grid {
     }
 
     /// Sleeps, then spins, to the next deadline. Deadlines that have passed meanwhile are
-    /// skipped, on the same grid: no cycle is ever made up for.
+    /// skipped, on the same grid: no cycle is ever made up for. `early` is called with the
+    /// deadline where there is time for it between sleep and deadline.
     #[inline]
-    pub fn wait(&mut self) -> Wake {
+    pub fn wait(&mut self, early: impl FnOnce(u64)) -> Wake {
         let wake_at = self.next - self.spin;
         if now_ns() < wake_at {
             let at = Timespec {
@@ -54,6 +58,10 @@ impl Grid {
             while clock_nanosleep_absolute(ClockId::Monotonic, &at).is_err() {}
         }
         let mut now = now_ns();
+        if now + RESERVE < self.next {
+            early(self.next);
+            now = now_ns();
+        }
         while now < self.next {
             std::hint::spin_loop();
             now = now_ns();
@@ -88,7 +96,7 @@ mod tests {
         let mut grid = Grid::start(1_000_000, 50_000);
         let first = grid.next;
         for _ in 0..20 {
-            let wake = grid.wait();
+            let wake = grid.wait(|deadline| assert_eq!((deadline - first) % 1_000_000, 0));
             assert!(wake.now_ns >= wake.deadline_ns);
             assert_eq!((wake.deadline_ns - first) % 1_000_000, 0);
         }

@@ -78,6 +78,25 @@ pub fn become_real_time(priority: u8, cpu: Option<usize>) -> (bool, Denied) {
     (fifo, denied)
 }
 
+/// Gives the calling thread `SCHED_FIFO` at `priority`, where that is not 0 and is granted.
+pub fn raise(priority: u8) {
+    if priority > 0 {
+        // What is denied here is denied to the loop too, which says so.
+        let _ = set_fifo(priority);
+    }
+}
+
+/// Has the process keep the memory that it frees: giving it back to the kernel interrupts every
+/// processor that runs one of its threads, the loop's too, and getting it again faults.
+pub fn keep_heap() {
+    #[cfg(target_env = "gnu")]
+    // SAFETY: mallopt only sets parameters of the allocator and is thread-safe.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_MAX, 0);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, libc::c_int::MAX);
+    }
+}
+
 /// Page faults of the calling thread so far: those served from memory, and from disk.
 #[must_use]
 pub fn page_faults() -> (i64, i64) {

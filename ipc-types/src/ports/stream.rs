@@ -1,12 +1,15 @@
 //! Streams of fixed-size samples: setpoints, states, telemetry, plan events.
 
+use core::cell::Cell;
 use core::fmt::Debug;
+use core::mem::MaybeUninit;
 
 use bytemuck::Pod;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{BackpressureStrategy, PortFactory as _, ipc};
+use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
@@ -24,10 +27,19 @@ impl Payload for PlanEvent {}
 /// The sending end of a stream. Sending never blocks; it allocates one small block (iceoryx2
 /// 0.10's chunk state), makes no system call while no receiver joins, and overwrites the oldest
 /// sample of a receiver that does not read.
-#[derive(Debug)]
 pub struct Sender<T: Payload> {
+    /// Taken ahead of its time by [`Self::prepare`].
+    ready: Cell<Option<Loan<T>>>,
     publisher: Publisher<ipc::Service, T, ()>,
     service: PortFactory<ipc::Service, T, ()>,
+}
+
+type Loan<T> = SampleMutUninit<ipc::Service, MaybeUninit<T>, ()>;
+
+impl<T: Payload> Debug for Sender<T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Sender").field("publisher", &self.publisher).finish_non_exhaustive()
+    }
 }
 
 impl<T: Payload> Sender<T> {
@@ -40,12 +52,28 @@ impl<T: Payload> Sender<T> {
                 .backpressure_strategy(BackpressureStrategy::DiscardData)
                 .create()
         })?;
-        Ok(Self { publisher, service })
+        Ok(Self { ready: Cell::new(None), publisher, service })
     }
 
     /// Sends a copy; to how many receivers.
     pub fn send(&self, value: &T) -> Result<usize, PortError> {
-        Ok(self.publisher.send_copy(*value)?)
+        let loan = match self.ready.take() {
+            Some(loan) => loan,
+            None => self.publisher.loan_uninit()?,
+        };
+        Ok(loan.write_payload(*value).send()?)
+    }
+
+    /// Takes the memory for the next send, and brings it into this processor's caches: what of a
+    /// send can be done before its content is known.
+    pub fn prepare(&self) -> Result<(), PortError> {
+        let mut loan = match self.ready.take() {
+            Some(loan) => loan,
+            None => self.publisher.loan_uninit()?,
+        };
+        loan.payload_mut().write(T::zeroed());
+        self.ready.set(Some(loan));
+        self.connect()
     }
 
     /// Connects to receivers that joined since the last send, and hands them the history. Does
