@@ -6,9 +6,9 @@ use std::thread;
 use std::time::Duration;
 
 use bytemuck::Zeroable;
-use nullsweep_executor::rt::become_real_time;
-use nullsweep_ipc_types::Setpoint;
+use nullsweep_executor::rt::{self, become_real_time};
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
+use nullsweep_ipc_types::{JointStates, Setpoint};
 
 use super::station;
 use super::stats::Times;
@@ -46,54 +46,75 @@ fn bare_loop(time: Duration) -> Times {
     }
 }
 
-/// One way from a thread that sends a setpoint each millisecond to one that waits for it as the
-/// lab's endpoint does, with nothing else done.
-pub(super) fn ping(
+/// What a loop takes that waits as the executor does, reads a state and sends a setpoint, and
+/// does nothing else.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Bare {
+    /// From its wake-up to its end, each cycle.
+    pub(super) compute: Times,
+    /// From the setpoint's stamp to the hand of a reader that waits as the lab's endpoint does.
+    pub(super) one_way: Times,
+}
+
+/// Runs that loop and its reader, which answers each setpoint with a state.
+pub(super) fn bare(
     root: &Path,
     time: Duration,
     priority: u8,
     cpu: Option<usize>,
-) -> anyhow::Result<Times> {
+    spin_ns: u64,
+) -> anyhow::Result<Bare> {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
         let receiving = scope.spawn(|| -> anyhow::Result<Times> {
-            let receiver = Ipc::open("ping", Some(root))?.setpoint_receiver()?;
-            let mut times = Times::default();
+            let ipc = Ipc::open("bare", Some(root))?;
+            let (receiver, sender) = (ipc.setpoint_receiver()?, ipc.state_sender()?);
+            let (mut times, mut state) = (Times::default(), JointStates::zeroed());
             let _ = become_real_time(priority.saturating_sub(1), None);
             let mut due_ns = now_ns();
             while !done.load(Ordering::Relaxed) {
                 if let Some(setpoint) = station::wait(&receiver, due_ns)? {
-                    times.record(now_ns().saturating_sub(setpoint.stamp_ns));
+                    let now = now_ns();
+                    times.record(now.saturating_sub(setpoint.stamp_ns));
                     due_ns = setpoint.deadline_ns;
+                    state.stamp_ns = now;
+                    state.setpoint_sequence = setpoint.sequence;
+                    sender.send(&state)?;
                 }
             }
             Ok(times)
         });
         let sending = scope.spawn(|| {
-            let _ = become_real_time(priority, cpu);
-            send(root, time)
+            let (fifo, _) = become_real_time(priority, cpu);
+            send(root, time, if fifo { spin_ns } else { 0 })
         });
         let sent = sending.join();
         done.store(true, Ordering::Relaxed);
-        let died = |_| anyhow::anyhow!("a thread of the ping died");
-        let times = receiving.join().map_err(died)?;
-        sent.map_err(died)?.and(times)
+        let died = |_| anyhow::anyhow!("a thread of the bare loop died");
+        let one_way = receiving.join().map_err(died)?;
+        Ok(Bare { compute: sent.map_err(died)??, one_way: one_way? })
     })
 }
 
-fn send(root: &Path, time: Duration) -> anyhow::Result<()> {
-    let sender = Ipc::open("ping", Some(root))?.setpoint_sender()?;
-    let mut grid = Grid::new(PERIOD_NS);
+fn send(root: &Path, time: Duration, spin_ns: u64) -> anyhow::Result<Times> {
+    let ipc = Ipc::open("bare", Some(root))?;
+    let (sender, receiver) = (ipc.setpoint_sender()?, ipc.state_receiver()?);
+    let mut times = Times::default();
+    let mut grid = rt::Grid::start(PERIOD_NS, spin_ns);
     let end_ns = now_ns() + time.as_nanos() as u64;
     let mut setpoint = Setpoint::zeroed();
     while setpoint.stamp_ns < end_ns {
-        let tick = grid.wait();
-        setpoint.deadline_ns = tick.due_ns + (tick.skipped + 1) * PERIOD_NS;
+        let wake = grid.wait(|_| ());
+        if let Some(newest) = receiver.newest()? {
+            setpoint.positions = newest.value.positions;
+        }
+        setpoint.deadline_ns = wake.deadline_ns + PERIOD_NS;
         setpoint.sequence += 1;
         setpoint.stamp_ns = now_ns();
         sender.send(&setpoint)?;
+        times.record(now_ns() - wake.now_ns);
     }
-    Ok(())
+    Ok(times)
 }
 
 #[cfg(test)]
@@ -105,8 +126,8 @@ mod tests {
         let times = sleep_loop(Duration::from_millis(50), 0, None).percentiles();
         assert!(times.count >= 50 && times.max_ns > 0, "{times:?}");
         let folder = tempfile::TempDir::new().expect("a folder");
-        let times =
-            ping(folder.path(), Duration::from_millis(100), 0, None).expect("both ends open");
-        assert!(times.percentiles().count > 0);
+        let bare = bare(folder.path(), Duration::from_millis(100), 0, None, 0).expect("both open");
+        assert!(bare.one_way.percentiles().count > 0);
+        assert!(bare.compute.percentiles().count > 0);
     }
 }

@@ -1,0 +1,227 @@
+//! What a run of the lab found, and how it is told.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+use std::thread;
+
+use anyhow::Context;
+use comfy_table::{CellAlignment, Table, presets};
+use nullsweep_ipc_types::HISTOGRAM_BUCKETS;
+use serde::Serialize;
+
+use super::stats::{Percentiles, Times, of_buckets};
+use super::{Args, picture};
+use crate::judge::Verdict;
+
+/// One row of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// What was timed.
+    pub what: &'static str,
+    /// Its percentiles.
+    #[serde(flatten)]
+    pub times: Percentiles,
+}
+
+/// What the changes from one plan to another did to the setpoints.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Swaps {
+    /// Changes that the endpoint saw.
+    pub count: usize,
+    /// The largest step of a joint at one of them, as a share of v·T.
+    pub step_ratio: f64,
+    /// The largest change of a joint's velocity at one of them. \[rad/s\] or \[m/s\]
+    pub velocity_step: f64,
+}
+
+impl Swaps {
+    pub(super) fn add(&mut self, verdict: &Verdict) {
+        for run in verdict.plans.iter().skip(1) {
+            self.count += 1;
+            self.step_ratio = self.step_ratio.max(run.join_step_ratio);
+            self.velocity_step = self.velocity_step.max(run.join_velocity_step);
+        }
+    }
+}
+
+/// Everything that was measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct Figures {
+    /// Kernel release.
+    pub kernel: String,
+    /// Whether the kernel calls itself real-time.
+    pub realtime_kernel: bool,
+    /// Logical processors.
+    pub processors: usize,
+    /// Load average of the last minute when the run began.
+    pub load: String,
+    /// Whether stress-ng ran.
+    pub stressed: bool,
+    /// Length of the executor's part. \[s\]
+    pub seconds: f64,
+    /// Seed of the moments of publishing.
+    pub seed: u64,
+    /// Knots of each published plan.
+    pub knots: u32,
+    /// The distributions.
+    pub rows: Vec<Row>,
+    /// Deadlines that the executor missed.
+    pub missed_cycles: u64,
+    /// Changes of plan.
+    pub swaps: Swaps,
+    /// Violations that the endpoint's judge found.
+    pub violations: u64,
+    /// Plans that were published, and those that were accepted.
+    pub plans: (usize, usize),
+}
+
+/// Sums over all rounds.
+#[derive(Default)]
+pub(super) struct Sums {
+    pub(super) sleep: Times,
+    pub(super) cyclictest: Option<Times>,
+    pub(super) bare_compute: Times,
+    pub(super) bare_one_way: Times,
+    pub(super) wake: [u32; HISTOGRAM_BUCKETS],
+    pub(super) compute: [u32; HISTOGRAM_BUCKETS],
+    pub(super) round_trip: [u32; HISTOGRAM_BUCKETS],
+    pub(super) made_late: Times,
+    pub(super) transport: Times,
+    pub(super) inter_arrival: Times,
+    pub(super) publication: Times,
+    pub(super) admission: Times,
+    pub(super) after_admission: Times,
+    pub(super) swap: Times,
+    pub(super) command: Times,
+    pub(super) missed: u64,
+    pub(super) swaps: Swaps,
+    pub(super) violations: u64,
+    pub(super) published: usize,
+    pub(super) accepted: usize,
+}
+
+impl Sums {
+    /// The distributions by name. Yardsticks come before what is measured against them.
+    fn rows(&self) -> Vec<Row> {
+        let row = |what, times: &Times| Row { what, times: times.percentiles() };
+        let own = |what, buckets| Row { what, times: of_buckets(buckets) };
+        let yardstick = self.cyclictest.iter().map(|t| row("cyclictest: wake-up lateness", t));
+        yardstick
+            .chain([
+                row("bare sleep loop: wake-up lateness", &self.sleep),
+                own("executor: wake-up lateness", &self.wake),
+                row("bare iceoryx2 loop: compute time", &self.bare_compute),
+                own("executor: compute time", &self.compute),
+                row("executor: setpoint sent after due", &self.made_late),
+                row("bare iceoryx2 loop: one way", &self.bare_one_way),
+                row("setpoint: sent to endpoint", &self.transport),
+                row("setpoint: inter-arrival", &self.inter_arrival),
+                own("setpoint to state, round trip", &self.round_trip),
+                row("plan: the publisher's own call", &self.publication),
+                row("plan: publish to admission", &self.admission),
+                row("plan: admission to first setpoint", &self.after_admission),
+                row("plan: publish to first setpoint", &self.swap),
+                row("operator's command to its answer", &self.command),
+            ])
+            .collect()
+    }
+
+    pub(super) fn figures(&self, args: &Args, load: String) -> Figures {
+        Figures {
+            kernel: read("/proc/sys/kernel/osrelease"),
+            realtime_kernel: read("/sys/kernel/realtime") == "1",
+            processors: thread::available_parallelism().map_or(0, usize::from),
+            load,
+            stressed: args.load,
+            seconds: args.seconds,
+            seed: args.seed,
+            knots: args.knots,
+            rows: self.rows(),
+            missed_cycles: self.missed,
+            swaps: self.swaps,
+            violations: self.violations,
+            plans: (self.published, self.accepted),
+        }
+    }
+
+    /// The tails as a page.
+    pub(super) fn page(&self, figures: &Figures) -> String {
+        let mut curves = vec![
+            ("executor: wake-up lateness", picture::of_histogram(&self.wake)),
+            ("executor: compute time", picture::of_histogram(&self.compute)),
+            ("bare sleep loop: wake-up lateness", picture::of_times(&self.sleep)),
+            ("bare iceoryx2 loop: compute time", picture::of_times(&self.bare_compute)),
+            ("setpoint: sent to endpoint", picture::of_times(&self.transport)),
+            ("bare iceoryx2 loop: one way", picture::of_times(&self.bare_one_way)),
+            ("plan: publish to first setpoint", picture::of_times(&self.swap)),
+            ("operator's command to its answer", picture::of_times(&self.command)),
+        ];
+        let yardstick = self.cyclictest.as_ref();
+        curves.extend(yardstick.map(|t| ("cyclictest: wake-up lateness", picture::of_times(t))));
+        picture::page(&format!("Latencies, kernel {}", figures.kernel), curves)
+    }
+}
+
+impl Figures {
+    /// Prints the table, and writes the figures as JSON to a file, or to standard output for `-`.
+    pub(super) fn tell(&self, json: Option<&Path>) -> anyhow::Result<()> {
+        match json {
+            Some(path) if path.as_os_str() == "-" => {
+                serde_json::to_writer_pretty(io::stdout().lock(), self)?;
+                println!();
+                return Ok(());
+            }
+            Some(path) => {
+                let file = File::create(path)
+                    .with_context(|| format!("cannot write the figures to {}", path.display()))?;
+                serde_json::to_writer_pretty(file, self)?;
+            }
+            None => {}
+        }
+        println!("{}", self.table());
+        Ok(())
+    }
+
+    fn table(&self) -> String {
+        let mut table = Table::new();
+        table.load_style(presets::UTF8_BORDERS_ONLY);
+        table.set_header(std::iter::once("µs").chain(Percentiles::HEADS));
+        for row in &self.rows {
+            table.add_row(std::iter::once(row.what.to_owned()).chain(row.times.cells()));
+        }
+        for column in table.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        let kind = if self.realtime_kernel { "a real-time kernel" } else { "no real-time kernel" };
+        let stress = if self.stressed { ", with stress-ng" } else { "" };
+        format!(
+            "{table}\nkernel {} ({kind}), {} processors, load {} at the start{stress}, {} s\n\
+             executor histograms are told by the upper bound of their bucket; {} deadlines missed\n\
+             {} plans of {} knots at random moments, {} accepted; {} violations at the endpoint\n\
+             {} changes of plan: largest step {:.3} of v·T, largest change of velocity {:.3} rad/s",
+            self.kernel,
+            self.processors,
+            self.load,
+            self.seconds,
+            self.missed_cycles,
+            self.plans.0,
+            self.knots,
+            self.plans.1,
+            self.violations,
+            self.swaps.count,
+            self.swaps.step_ratio,
+            self.swaps.velocity_step,
+        )
+    }
+}
+
+/// Load average of the last minute.
+pub(super) fn loadavg() -> String {
+    read("/proc/loadavg").split(' ').next().unwrap_or_default().to_owned()
+}
+
+/// A small file of the kernel's, without its line end; empty where it is not there.
+fn read(path: &str) -> String {
+    fs::read_to_string(path).map(|text| text.trim_end().to_owned()).unwrap_or_default()
+}
