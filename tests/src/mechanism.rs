@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use nullsweep_ipc_types::Setpoint;
 use nullsweep_robot::{Arm, JointVector};
 
-use crate::plant::Plant;
+use crate::plant::{Plant, Target};
 
 /// Period of the control loop. \[ns\]
 const PERIOD_NS: u64 = 1_000_000;
@@ -91,10 +91,7 @@ pub struct Mechanism {
     velocities: JointVector,
     efforts: JointVector,
     measured: JointVector,
-    target: JointVector,
-    target_velocity: JointVector,
-    /// When the target is reached and its velocity ends. \[ns\]
-    reached_ns: u64,
+    target: Target,
     /// Integral shares of the efforts. \[N·m\]
     integrals: JointVector,
     enabled: bool,
@@ -120,9 +117,7 @@ impl Mechanism {
             velocities: zero,
             efforts: zero,
             measured: positions,
-            target: positions,
-            target_velocity: zero,
-            reached_ns: now_ns,
+            target: Target::rest(positions, now_ns),
             integrals: zero,
             enabled: true,
             payload: 0.0,
@@ -148,8 +143,9 @@ impl Mechanism {
         for j in 0..JOINTS {
             // Velocity as the encoders give it is too coarse a number to damp with; the PR2
             // filters it, here the true one stands for the filtered one.
-            let wanted = if self.now_ns <= self.reached_ns { self.target_velocity[j] } else { 0.0 };
-            let error = self.target[j] - self.measured[j];
+            let moving = self.now_ns <= self.target.reached_ns;
+            let wanted = if moving { self.target.velocities[j] } else { 0.0 };
+            let error = self.target.positions[j] - self.measured[j];
             let [p, i, d] = ARM[j].gains;
             let bound = ARM[j].integral;
             self.integrals[j] = (self.integrals[j] + i * error * dt).clamp(-bound, bound);
@@ -251,15 +247,12 @@ impl Plant for Mechanism {
             self.hold();
             self.enabled = true;
         }
-        self.target[..JOINTS].copy_from_slice(&setpoint.positions[..JOINTS]);
-        self.target_velocity[..JOINTS].copy_from_slice(&setpoint.velocities[..JOINTS]);
-        self.reached_ns = setpoint.deadline_ns.min(self.now_ns + 2 * PERIOD_NS);
+        self.target = Target::of(setpoint, JOINTS, self.now_ns);
     }
 
     /// Holds where it is measured and forgets the integrals, as the PR2's controllers do.
     fn hold(&mut self) {
-        self.target = self.measured;
-        self.target_velocity = JointVector::default();
+        self.target = Target::rest(self.measured, self.now_ns);
         self.integrals = JointVector::default();
     }
 

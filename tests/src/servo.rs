@@ -4,7 +4,7 @@
 use nullsweep_ipc_types::Setpoint;
 use nullsweep_robot::{Arm, JointVector};
 
-use crate::plant::Plant;
+use crate::plant::{Plant, Target};
 
 /// Joints without inertia.
 #[derive(Clone, Debug)]
@@ -20,22 +20,12 @@ pub struct Servo {
     target: Target,
 }
 
-/// A line in joint space that ends in `positions` at `reached_ns` and rests there.
-#[derive(Clone, Debug)]
-struct Target {
-    positions: JointVector,
-    velocities: JointVector,
-    reached_ns: u64,
-}
-
 impl Servo {
     /// Bandwidth of the position loop: the error after a corner of 1 rad/s stays below
     /// 1/(e·ω) = 3 mrad. \[rad/s\]
     pub const OMEGA: f64 = 125.0;
     /// How much faster than the velocity limit the servo may catch up.
     const CATCH_UP: f64 = 1.05;
-    /// A setpoint is never approached for longer than this; a longer deadline is not believed.
-    const LONGEST_APPROACH_NS: u64 = 2_000_000;
 
     /// An arm at rest.
     #[must_use]
@@ -44,19 +34,15 @@ impl Servo {
         for (j, limits) in arm.limits().iter().enumerate() {
             speed_limits[j] = limits.velocity * Self::CATCH_UP;
         }
-        let velocities = JointVector::default();
-        let target = Target { positions, velocities, reached_ns: now_ns };
-        let dof = arm.dof();
-        let efforts = velocities;
         Self {
             omega: Self::OMEGA,
             speed_limits,
-            dof,
+            dof: arm.dof(),
             now_ns,
             positions,
-            velocities,
-            efforts,
-            target,
+            velocities: JointVector::default(),
+            efforts: JointVector::default(),
+            target: Target::rest(positions, now_ns),
         }
     }
 
@@ -100,20 +86,11 @@ impl Plant for Servo {
 
     fn follow(&mut self, setpoint: &Setpoint) {
         self.advance(setpoint.stamp_ns);
-        let longest = self.now_ns + Self::LONGEST_APPROACH_NS;
-        self.target.reached_ns = setpoint.deadline_ns.clamp(self.now_ns, longest);
-        for j in 0..self.dof {
-            self.target.positions[j] = setpoint.positions[j];
-            self.target.velocities[j] = setpoint.velocities[j];
-        }
+        self.target = Target::of(setpoint, self.dof, self.now_ns);
     }
 
     fn hold(&mut self) {
-        self.target = Target {
-            positions: self.positions,
-            velocities: JointVector::default(),
-            reached_ns: self.now_ns,
-        };
+        self.target = Target::rest(self.positions, self.now_ns);
     }
 
     /// Brakes locked: the joints stand at once.
