@@ -131,7 +131,8 @@ pub fn find(scan: &Scan, config: &PatchConfig, seed: u64) -> Vec<Patch> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut order: Vec<u32> = (0..scan.points.len() as u32).collect();
     order.shuffle(&mut rng);
-    let least = min_points(&grid, scan, config);
+    let full = median_neighbourhood(&grid, scan, config.epsilon);
+    let least = config.min_points.max((config.min_share * full as f64) as usize);
     let mut taken = vec![false; scan.points.len()];
     let mut patches = Vec::new();
     let mut near = Vec::new();
@@ -179,9 +180,14 @@ pub fn owners(scan: &Scan, patches: &[Patch], reach: f64) -> Vec<Option<u32>> {
     owners
 }
 
-/// The fewest points of a patch: a share of the points that a full neighbourhood holds, which is
-/// taken as the median over the scan, as borders hold fewer.
-fn min_points(grid: &Grid, scan: &Scan, config: &PatchConfig) -> usize {
+/// The points that a full neighbourhood of the radius holds: the median over the scan, as borders
+/// hold fewer.
+#[must_use]
+pub fn full_neighbourhood(scan: &Scan, radius: f64) -> usize {
+    median_neighbourhood(&Grid::new(&scan.points, radius), scan, radius)
+}
+
+fn median_neighbourhood(grid: &Grid, scan: &Scan, radius: f64) -> usize {
     let stride = scan.points.len().div_ceil(500).max(1);
     let mut counts: Vec<usize> = scan
         .points
@@ -189,13 +195,12 @@ fn min_points(grid: &Grid, scan: &Scan, config: &PatchConfig) -> usize {
         .step_by(stride)
         .map(|point| {
             let mut count = 0;
-            grid.within(point, config.epsilon, |_, _, _| count += 1);
+            grid.within(point, radius, |_, _, _| count += 1);
             count
         })
         .collect();
     counts.sort_unstable();
-    let full = counts.get(counts.len() / 2).copied().unwrap_or(0);
-    config.min_points.max((config.min_share * full as f64) as usize)
+    counts.get(counts.len() / 2).copied().unwrap_or(0)
 }
 
 /// The plane with the most inliers, refitted to them, as a patch if it is good enough.

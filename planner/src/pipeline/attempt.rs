@@ -129,11 +129,16 @@ impl Shop<'_> {
         (0..swept.len()).map(|i| self.to_sweep[i] && !swept[i] && !self.already[i]).collect()
     }
 
-    /// Patches over what is left, at most as far across as the pad is wide: swept at any heading.
-    pub(super) fn fill_in(&self, left: &[bool]) -> Vec<Patch> {
-        let epsilon = self.job.patches.epsilon.min(0.5 * self.job.tool.width);
-        let config = PatchConfig { epsilon, ..self.job.patches.clone() };
+    /// Patches of at least `min_points` over what is left, at most as far across as the pad is
+    /// wide: swept at any heading.
+    pub(super) fn fill_in(&self, left: &[bool], min_points: usize) -> Vec<Patch> {
+        let epsilon = self.fill_in_radius();
+        let config = PatchConfig { epsilon, min_points, ..self.job.patches.clone() };
         patches::fill_in(self.scan, left, &config, self.job.tool.reach_angle)
+    }
+
+    pub(super) fn fill_in_radius(&self) -> f64 {
+        self.job.patches.epsilon.min(0.5 * self.job.tool.width)
     }
 
     /// The patches with others over what the attempt leaves out; `None` where nothing can be
@@ -144,7 +149,7 @@ impl Shop<'_> {
         clock: &mut Clock,
     ) -> Option<(Vec<Patch>, Vec<Option<Sample>>)> {
         self.progress.stage("fill in", None);
-        let extra = self.fill_in(&attempt.left);
+        let extra = self.fill_in(&attempt.left, self.job.patches.min_points);
         let reached = clock.time("reach", || reach(self.cell, &extra, self.job.ik_samples, &|| ()));
         if !reached.iter().any(Option::is_some) {
             return None;

@@ -18,11 +18,13 @@ use crate::formulation::{Stop, pose};
 use crate::graph::Edge;
 use crate::layered::{Motion, Moves};
 use crate::motion::{Leg, Mover};
-use crate::patches::Patch;
+use crate::patches::{self, Patch};
 use crate::reach::{Sample, redundancies};
 
 /// Times that patches are put over what is left: a side trip may leave slivers of its own.
 const ROUNDS: usize = 3;
+/// Least area that is worth a side trip, as a share of what the pad covers at any heading.
+const WORTH: f64 = 0.1;
 /// Stops nearby that a side trip is tried from.
 const STOPS: usize = 8;
 /// Samples that a side trip from one stop is tried to, nearest redundancy value first.
@@ -59,13 +61,15 @@ struct Completion<'a, C> {
 
 impl<C: Cost> Completion<'_, C> {
     fn run(&self, attempt: &mut Attempt) {
+        let full = patches::full_neighbourhood(self.shop.scan, self.shop.fill_in_radius());
+        let worth = ((WORTH * full as f64) as usize).max(1);
         for _ in 0..ROUNDS {
             let mut gained = false;
             let mut left = attempt.left.clone();
-            for patch in self.shop.fill_in(&attempt.left) {
+            for patch in self.shop.fill_in(&attempt.left, worth) {
                 // A side trip sweeps more than the patch that it was made for.
                 let open = patch.points.iter().filter(|&&i| left[i as usize]).count();
-                if open < self.shop.job.patches.min_points {
+                if open < worth {
                     continue;
                 }
                 attempt.patches.push(patch);
