@@ -25,6 +25,7 @@ pub mod layered;
 pub mod motion;
 pub mod transfer;
 
+pub mod curve;
 pub mod plan;
 pub mod timing;
 

@@ -11,7 +11,9 @@ use nullsweep_robot::{JointVector, MAX_DOF};
 use serde::{Deserialize, Serialize};
 
 use crate::cost::CostKind;
+use crate::curve::Curve;
 use crate::formulation::Method;
+use crate::timing::Profile;
 use crate::tool::Tool;
 
 /// The version of the plan file that this build reads and writes.
@@ -40,6 +42,9 @@ pub struct Plan {
     pub method: Method,
     /// What was minimised.
     pub cost: CostKind,
+    /// How fast it goes along its path, and so how the joints move between knots.
+    #[serde(default)]
+    pub profile: Profile,
     /// Seed of every random choice.
     pub seed: u64,
     /// The timed path.
@@ -83,6 +88,9 @@ pub struct PlanKnot {
     pub time_ns: u64,
     /// Joint vector, continuous joints unwrapped along the plan. \[rad\] or \[m\]
     pub q: JointVector,
+    /// Joint velocities, of a plan with limited acceleration; else zero. \[rad/s\] or \[m/s\]
+    #[serde(skip_serializing_if = "is_zero", default)]
+    pub v: JointVector,
     /// The planned pad centre in the root frame while the pad is on the surface. \[m\]
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub line: Option<[f64; 3]>,
@@ -190,6 +198,18 @@ impl Plan {
         self.knots.get(knot)?.line.map(Point3::from)
     }
 
+    /// The motion that ends in a knot, as the executor interpolates it; a stand-still at the first
+    /// one.
+    #[must_use]
+    pub fn curve(&self, knot: usize) -> Curve {
+        let (a, b) = (&self.knots[knot.saturating_sub(1)], &self.knots[knot]);
+        let seconds = b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9;
+        match self.profile {
+            Profile::Velocity => Curve::line(&a.q, &b.q, seconds),
+            Profile::Acceleration => Curve::cubic((&a.q, &a.v), (&b.q, &b.v), seconds),
+        }
+    }
+
     /// Whether the pad is on the surface in the segment that ends in a knot.
     #[must_use]
     pub fn on_surface(&self, knot: usize) -> bool {
@@ -226,7 +246,10 @@ impl Plan {
             held_count: self.held.len() as u32,
             joint_count: self.joints.len() as u32,
             knot_count: knots.len() as u32,
-            interpolation: Interpolation::Linear.wire(),
+            interpolation: match self.profile {
+                Profile::Velocity => Interpolation::Linear.wire(),
+                Profile::Acceleration => Interpolation::Cubic.wire(),
+            },
             ..PlanHeader::default()
         };
         for (slot, held) in header.held_positions.iter_mut().zip(&self.held) {
@@ -241,15 +264,21 @@ impl PlanKnot {
     fn wire(&self, on_surface: bool) -> Knot {
         let mut positions = [0.0; MAX_JOINTS];
         positions[..MAX_DOF].copy_from_slice(&self.q);
+        let mut velocities = [0.0; MAX_JOINTS];
+        velocities[..MAX_DOF].copy_from_slice(&self.v);
         let contact = if on_surface { Contact::Contact } else { Contact::Transfer };
         Knot {
             time_from_start_ns: self.time_ns,
             positions,
-            velocities: [0.0; MAX_JOINTS],
+            velocities,
             patch: self.patch.unwrap_or(Knot::NO_PATCH),
             contact: contact.wire(),
         }
     }
+}
+
+fn is_zero(v: &JointVector) -> bool {
+    *v == JointVector::default()
 }
 
 /// 64-bit numbers as hexadecimal strings.

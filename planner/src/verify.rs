@@ -2,15 +2,17 @@
 //! fails is never published.
 
 use nalgebra::{Isometry3, Point3};
-use nullsweep_robot::{Arm, JointVector, MAX_DOF};
+use nullsweep_robot::{Arm, JointVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::collision::{ToolContact, World};
 use crate::coverage;
+use crate::curve::Curve;
 use crate::plan::Plan;
 use crate::scan::Scan;
 use crate::surface::Surface;
+use crate::timing::Profile;
 
 /// What was found wrong.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,6 +35,9 @@ pub enum ViolationKind {
     NotFinite,
     /// A joint is faster than its limit.
     Velocity,
+    /// A joint of a plan with limited acceleration speeds up or slows down by more than its limit,
+    /// or is not at rest at the end.
+    Acceleration,
     /// A joint is outside its soft limits with their braking margin at its velocity.
     SoftLimit,
     /// The arm, its tool or the body collides.
@@ -68,6 +73,10 @@ const COLLISION_STEP: f64 = 0.02;
 const LIFT: f64 = 0.052;
 /// Joints move at most this far between two looks at the pad. \[rad\] or \[m\]
 const PAD_STEP: f64 = 0.01;
+/// Time between two samples of a plan with limited acceleration. \[s\]
+const SAMPLE: f64 = 1e-3;
+/// What an acceleration may exceed its limit by, as a share of it.
+const ROUNDING: f64 = 1e-6;
 
 /// Checks limits, times and collisions, and measures line, distance and swept coverage. `arm`
 /// and `scan` in the plan's stance: the root frame; `already` marks points that were swept before
@@ -137,19 +146,83 @@ fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
             report(k, ViolationKind::TimeOrder, format!("time {} ns", knot.time_ns));
             continue;
         }
+        let curve = before.map(|_| plan.curve(k));
+        let curve = curve.unwrap_or_else(|| Curve::line(&knot.q, &knot.q, 1.0));
         for (j, name) in arm.joint_names().iter().enumerate() {
-            let velocity = before
-                .map_or(0.0, |b| (knot.q[j] - b.q[j]) / ((knot.time_ns - b.time_ns) as f64 * 1e-9));
-            let limit = arm.limits()[j].velocity;
-            if velocity.abs() > limit * (1.0 + 1e-9) {
-                let detail = format!("{name}: {velocity:.4} of {limit:.4}");
+            let limits = &arm.limits()[j];
+            let velocity = curve.top_speed(j);
+            if !(velocity <= limits.velocity * (1.0 + 1e-9)) {
+                let detail = format!("{name}: {velocity:.4} of {:.4}", limits.velocity);
                 report(k, ViolationKind::Velocity, detail);
             }
+            if plan.profile == Profile::Acceleration {
+                let acceleration = curve.top_acceleration(j);
+                if !(acceleration <= limits.acceleration * (1.0 + ROUNDING)) {
+                    let detail = format!("{name}: {acceleration:.4} of {:.4}", limits.acceleration);
+                    report(k, ViolationKind::Acceleration, detail);
+                }
+            }
             let (low, high) = arm.braking_limits(j, velocity);
-            if !(low..=high).contains(&knot.q[j]) {
-                let detail = format!("{name}: {:.4} outside {low:.4} … {high:.4}", knot.q[j]);
+            let (lowest, highest) = curve.range(j);
+            if !(lowest >= low && highest <= high) {
+                let detail =
+                    format!("{name}: {lowest:.4} … {highest:.4} outside {low:.4} … {high:.4}");
                 report(k, ViolationKind::SoftLimit, detail);
             }
+        }
+    }
+    if plan.profile == Profile::Acceleration {
+        let starts = plan.knots.first().filter(|_| plan.continues.is_none()).map(|k| (0, k));
+        let ends = plan.knots.last().map(|k| (plan.knots.len() - 1, k));
+        for (k, knot) in starts.into_iter().chain(ends) {
+            if knot.v != JointVector::default() {
+                report(k, ViolationKind::Acceleration, format!("not at rest: {:?}", knot.v));
+            }
+        }
+        found.extend(sampled(plan, arm));
+    }
+    found
+}
+
+/// Velocity and acceleration of the positions that a controller gets every [`SAMPLE`], by
+/// differences: what bounds on each curve by itself do not see is a step where two curves meet.
+fn sampled(plan: &Plan, arm: &Arm) -> Vec<Violation> {
+    let mut found = Vec::new();
+    let mut last: Vec<JointVector> = Vec::new();
+    let mut k = 1;
+    let end_ns = plan.knots.last().map_or(0, |k| k.time_ns);
+    for time_ns in (0..=end_ns).step_by((SAMPLE * 1e9) as usize) {
+        while k + 1 < plan.knots.len() && plan.knots[k].time_ns < time_ns {
+            k += 1;
+        }
+        let Some(from) = plan.knots.get(k - 1).filter(|_| k < plan.knots.len()) else { break };
+        let curve = plan.curve(k);
+        let now = curve.at((time_ns - from.time_ns) as f64 * 1e-9 / curve.seconds());
+        if let [.., two, one] = last[..] {
+            for (j, name) in arm.joint_names().iter().enumerate() {
+                let limits = &arm.limits()[j];
+                let velocity = (now[j] - one[j]) / SAMPLE;
+                let acceleration = (now[j] - 2.0 * one[j] + two[j]) / (SAMPLE * SAMPLE);
+                let fast = velocity.abs() > limits.velocity * (1.0 + 1e-9);
+                let hard = acceleration.abs() > limits.acceleration * (1.0 + ROUNDING);
+                if fast || hard {
+                    found.push(Violation {
+                        knot: k,
+                        kind: if hard {
+                            ViolationKind::Acceleration
+                        } else {
+                            ViolationKind::Velocity
+                        },
+                        detail: format!(
+                            "{name} at {time_ns} ns: sampled {velocity:.4}, {acceleration:.4}"
+                        ),
+                    });
+                }
+            }
+        }
+        last.push(now);
+        if last.len() > 2 {
+            last.remove(0);
         }
     }
     found
@@ -167,12 +240,12 @@ fn collisions(
     let per_segment: Vec<(Option<Violation>, usize)> = (1..plan.knots.len())
         .into_par_iter()
         .map(|k| {
-            let (a, b) = (&plan.knots[k - 1], &plan.knots[k]);
-            let steps = steps(&a.q, &b.q, COLLISION_STEP);
+            let curve = plan.curve(k);
+            let steps = steps(&curve, COLLISION_STEP);
             let may_touch = plan.on_surface(k) || lifts[k];
             let contact = if may_touch { ToolContact::Allowed } else { ToolContact::Forbidden };
             let hit = (1..=steps).find_map(|s| {
-                let q = between(&a.q, &b.q, s as f64 / steps as f64);
+                let q = curve.at(s as f64 / steps as f64);
                 exact.first_hit(&q, contact).map(|hit| Violation {
                     knot: k,
                     kind: ViolationKind::Collision,
@@ -220,15 +293,23 @@ fn pad_motion(plan: &Plan, arm: &Arm) -> Vec<Pad> {
     (1..plan.knots.len())
         .into_par_iter()
         .flat_map_iter(|k| {
-            let (a, b) = (&plan.knots[k - 1], &plan.knots[k]);
+            let curve = plan.curve(k);
             let line = plan.line(k - 1).zip(plan.line(k));
-            let steps = if line.is_some() { steps(&a.q, &b.q, PAD_STEP) } else { 0 };
+            let steps = if line.is_some() { steps(&curve, PAD_STEP) } else { 0 };
             let first = usize::from(k > 1 && plan.knots[k - 1].line.is_some());
             (first..=steps).filter_map(move |s| {
                 let (from, to) = line?;
-                let q = between(&a.q, &b.q, s as f64 / steps as f64);
+                let q = curve.at(s as f64 / steps as f64);
                 let pose = arm.tip_pose(&q) * contact_in_tip;
-                let deviation = to_segment(&Point3::from(pose.translation.vector), &from, &to);
+                let pad = Point3::from(pose.translation.vector);
+                // Between knots the pad may be a little ahead of the line's points, or behind.
+                let around = [(k.checked_sub(2), k - 1), (Some(k), k + 1)];
+                let deviation = around
+                    .into_iter()
+                    .filter_map(|(a, b)| Some((plan.line(a?)?, plan.line(b)?)))
+                    .chain([(from, to)])
+                    .map(|(a, b)| to_segment(&pad, &a, &b))
+                    .fold(f64::INFINITY, f64::min);
                 Some(Pad { pose, deviation })
             })
         })
@@ -241,13 +322,8 @@ pub fn contact_motion(plan: &Plan, arm: &Arm) -> Vec<Isometry3<f64>> {
     pad_motion(plan, arm).into_iter().map(|p| p.pose).collect()
 }
 
-fn steps(a: &JointVector, b: &JointVector, step: f64) -> usize {
-    let farthest = (0..MAX_DOF).map(|j| (b[j] - a[j]).abs()).fold(0.0, f64::max);
-    ((farthest / step).ceil() as usize).max(1)
-}
-
-fn between(a: &JointVector, b: &JointVector, share: f64) -> JointVector {
-    std::array::from_fn(|j| a[j] + share * (b[j] - a[j]))
+fn steps(curve: &Curve, step: f64) -> usize {
+    ((curve.way() / step).ceil() as usize).max(1)
 }
 
 fn to_segment(p: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>) -> f64 {

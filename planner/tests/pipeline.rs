@@ -11,8 +11,9 @@ use nullsweep_planner::progress::Silent;
 use nullsweep_planner::scan::{CleanConfig, Placement, Region, clean_region, place};
 use nullsweep_planner::simulate;
 use nullsweep_planner::stance::Stance;
+use nullsweep_planner::timing::Profile;
 use nullsweep_planner::tool::Tool;
-use nullsweep_robot::{ArmSpec, Robot, Side};
+use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 
 fn seat() -> Region {
     let view = simulate::chair(1);
@@ -35,6 +36,7 @@ fn job(seat: &Region, method: Method, cost: CostKind) -> Job {
         cost,
         ik_samples: 30,
         v_max: None,
+        profile: Profile::Velocity,
         patches: PatchConfig::default(),
         graph: GraphConfig::default(),
         formulation: FormulationConfig::default(),
@@ -95,4 +97,62 @@ fn a_plan_goes_on_from_a_knot_and_survives_its_file() {
 
     std::fs::write(&path, "{\"format\": 1}").expect("written");
     assert!(matches!(Plan::read(&path), Err(PlanError::Parse { .. })));
+}
+
+/// The positions that a controller gets every millisecond, and the limits that their differences
+/// break, as a share of them.
+fn worst_sample(plan: &Plan, arm: &Arm) -> (f64, f64) {
+    let period = 1e-3;
+    let mut k = 1;
+    let end_ns = plan.knots[plan.knots.len() - 1].time_ns;
+    let samples: Vec<_> = (0..=end_ns)
+        .step_by(1_000_000)
+        .map(|t| {
+            while plan.knots[k].time_ns < t {
+                k += 1;
+            }
+            let curve = plan.curve(k);
+            curve.at((t - plan.knots[k - 1].time_ns) as f64 * 1e-9 / curve.seconds())
+        })
+        .collect();
+    let mut worst = (0.0f64, 0.0f64);
+    for w in samples.windows(3) {
+        for (j, limits) in arm.limits().iter().enumerate() {
+            let velocity = (w[2][j] - w[1][j]) / period;
+            let acceleration = (w[2][j] - 2.0 * w[1][j] + w[0][j]) / (period * period);
+            worst.0 = worst.0.max(velocity.abs() / limits.velocity);
+            worst.1 = worst.1.max(acceleration.abs() / limits.acceleration);
+        }
+    }
+    worst
+}
+
+#[test]
+fn limited_acceleration_keeps_line_limits_and_joins_in_motion() {
+    let seat = seat();
+    let job = Job {
+        profile: Profile::Acceleration,
+        ik_samples: 10,
+        refinements: 0,
+        ..job(&seat, Method::Tsp, CostKind::Time)
+    };
+    let first = plan_on(2, &seat, &job);
+    check(&first);
+    let (velocity, acceleration) = worst_sample(&first.plan, &first.arm);
+    assert!(velocity <= 1.0 + 1e-6 && acceleration <= 1.0 + 1e-6, "{velocity} {acceleration}");
+    assert!(velocity.max(acceleration) > 0.98, "nothing is used: {velocity} {acceleration}");
+
+    // In a knot at full motion: the new plan begins with the same velocity, to the bit.
+    let knots = &first.plan.knots;
+    let speed = |k: usize| knots[k].v.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    let middle = knots.len() / 3..knots.len() / 2;
+    let knot = middle.max_by(|a, b| speed(*a).total_cmp(&speed(*b))).expect("knots");
+    let (q, v) = (knots[knot].q, knots[knot].v);
+    let after = Some(After { plan: first.plan, knot, again: false });
+    let second = plan_on(2, &seat, &Job { after, ..job });
+    check(&second);
+    assert_eq!((second.plan.knots[0].q, second.plan.knots[0].v), (q, v));
+    assert!(v.iter().any(|v| *v != 0.0));
+    let (velocity, acceleration) = worst_sample(&second.plan, &second.arm);
+    assert!(velocity <= 1.0 + 1e-6 && acceleration <= 1.0 + 1e-6, "{velocity} {acceleration}");
 }

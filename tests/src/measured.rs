@@ -54,6 +54,7 @@ mod tests {
     use nullsweep_planner::cost::CostKind;
     use nullsweep_planner::formulation::Method;
     use nullsweep_planner::plan::{FORMAT, SurfaceSample};
+    use nullsweep_planner::timing::Profile;
     use nullsweep_planner::tool::Tool;
     use nullsweep_robot::{ArmSpec, Robot, Side};
 
@@ -79,6 +80,7 @@ mod tests {
             base: [0.0; 3],
             method: Method::Tsp,
             cost: CostKind::Time,
+            profile: Profile::Velocity,
             seed: 1,
             knots: Vec::new(),
             patches: Vec::new(),

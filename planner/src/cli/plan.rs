@@ -24,6 +24,7 @@ use crate::report;
 use crate::scan::{self, CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan};
 use crate::simulate;
 use crate::stance::{Stance, StanceSearch};
+use crate::timing::Profile;
 use crate::tool::Tool;
 
 #[derive(Debug, Args)]
@@ -99,6 +100,10 @@ pub(super) struct PlanArgs {
     /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
     #[arg(long)]
     v_max: Option<f64>,
+    /// How fast the plan goes along its path: at bang-bang velocity, or as fast as velocity and
+    /// acceleration allow, corners blended within the line's tolerance.
+    #[arg(long, value_enum, default_value = "velocity")]
+    profile: Profile,
     /// Radius of a patch's neighbourhood. [m]
     #[arg(long, default_value_t = PatchConfig::default().epsilon)]
     patch_radius: f64,
@@ -459,6 +464,7 @@ fn job(args: &PlanArgs, scene: &Scene) -> anyhow::Result<Job> {
         cost: args.cost,
         ik_samples: args.ik_samples as usize,
         v_max: args.v_max,
+        profile: args.profile,
         patches: PatchConfig { epsilon: args.patch_radius, ..PatchConfig::default() },
         graph: GraphConfig {
             neighbours: args.neighbours,

@@ -17,7 +17,7 @@ use crate::reach::{Sample, Workcell, reach, redundancies};
 use crate::scan::Scan;
 use crate::stance::Stance;
 use crate::surface::Surface;
-use crate::timing;
+use crate::timing::{self, Profile};
 use crate::verify;
 
 /// What every attempt at a plan shares, in the root frame.
@@ -261,7 +261,7 @@ impl Shop<'_> {
             for (q, line) in leg.joints.iter().zip(&leg.line).skip(first) {
                 let q = std::array::from_fn(|j| q[j] + shift[j]);
                 let line = line.map(|p| [p.x, p.y, p.z]);
-                knots.push(PlanKnot { time_ns: 0, q, line, patch: None });
+                knots.push(PlanKnot { time_ns: 0, q, v: [0.0; MAX_DOF], line, patch: None });
             }
             if let Some(last) = knots.last_mut() {
                 last.patch = Some(*patch as u32);
@@ -294,6 +294,7 @@ impl Shop<'_> {
             base: stance.base,
             method: job.method,
             cost: job.cost,
+            profile: Profile::Velocity,
             seed: job.seed,
             knots,
             patches: patches.iter().map(|p| p.centre.into()).collect(),

@@ -23,6 +23,7 @@ use crate::reach::{Sample, Workcell, reach};
 use crate::scan::Scan;
 use crate::stance::{Stance, StanceSearch};
 use crate::surface::Surface;
+use crate::timing::{Limits, Profile, Rest, accelerate};
 use crate::tool::Tool;
 use crate::verify::{self, Verification};
 use attempt::{Attempt, Shop};
@@ -53,6 +54,8 @@ pub struct Job {
     pub ik_samples: usize,
     /// One velocity for all joints; `None`: the robot's limits. \[rad/s\]
     pub v_max: Option<f64>,
+    /// How fast the plan goes along its path.
+    pub profile: Profile,
     /// Patch extraction.
     pub patches: PatchConfig,
     /// Graph construction.
@@ -256,12 +259,25 @@ pub fn run(
     progress.stage("stance", None);
     let setting = clock.time("stance", || settle(robot, &free_arm, scan, &patches, job))?;
     let Setting { stance, arm, scan, patches, world } = setting;
-    let start = start(job, &arm, &world)?;
+    let mut start = start(job, &arm, &world)?;
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
 
+    // A plan that joins another one in motion first comes to rest on the other one's path.
+    let mut rest = None;
+    if let (Some(after), Profile::Acceleration) = (&job.after, job.profile)
+        && after.plan.profile == Profile::Acceleration
+    {
+        rest = Rest::after(&after.plan, after.knot, &Limits::of(&arm, None));
+    }
+    if let Some(last) = rest.as_ref().and_then(|rest| rest.knots.last()) {
+        start = last.q;
+    }
     let already = job.after.as_ref().map_or_else(
         || Ok(vec![false; scan.points.len()]),
-        |after| swept_before(after, &arm, &scan),
+        |after| {
+            let knot = rest.as_ref().map_or(after.knot, |rest| rest.at);
+            swept_before(&After { knot, ..after.clone() }, &arm, &scan)
+        },
     )?;
     progress.stage("reach", Some(patches.len()));
     let reached =
@@ -300,7 +316,14 @@ pub fn run(
         best = next;
     }
     shop.complete(&mut best, &mut clock);
-    let Attempt { patches, graph, sequence, plan, .. } = best;
+    let Attempt { patches, graph, sequence, mut plan, .. } = best;
+    if job.profile == Profile::Acceleration {
+        progress.stage("timing", None);
+        plan = clock.time("timing", || accelerate(&plan, cell, &Limits::of(&arm, job.v_max), &[]));
+        if let Some(rest) = rest {
+            plan = rest.then(plan);
+        }
+    }
 
     progress.stage("verify", Some(plan.knots.len().saturating_sub(1)));
     let verification = clock.time("verify", || {

@@ -7,6 +7,7 @@ use nullsweep_ipc_types::EventKind;
 use nullsweep_planner::cost::CostKind;
 use nullsweep_planner::formulation::Method;
 use nullsweep_planner::plan::{Continues, FORMAT, Held, Plan, PlanKnot, SurfaceSample};
+use nullsweep_planner::timing::Profile;
 use nullsweep_planner::tool::Tool;
 use nullsweep_robot::{Arm, JointVector};
 use nullsweep_tests::sketch::{Sketch, swung};
@@ -29,6 +30,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
     let knot = |k: usize| PlanKnot {
         time_ns: sketch.knots[k].time_from_start_ns,
         q: sketch.posture(k),
+        v: JointVector::default(),
         line: None,
         patch: None,
     };
@@ -46,6 +48,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         base: [0.0; 3],
         method: Method::Tsp,
         cost: CostKind::Time,
+        profile: Profile::Velocity,
         seed: 1,
         knots: (0..sketch.knots.len()).map(knot).collect(),
         patches: Vec::new(),

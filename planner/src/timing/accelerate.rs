@@ -1,0 +1,206 @@
+//! A plan with bang-bang velocity becomes one with limited acceleration.
+
+use nalgebra::Point3;
+use nullsweep_robot::JointVector;
+
+use super::run::{Piece, Run};
+use super::sampled::{Timed, braked, timed};
+use super::smooth::{cut, smooth};
+use super::{Limits, Profile};
+use crate::collision::ToolContact;
+use crate::plan::{Plan, PlanKnot};
+use crate::reach::Workcell;
+
+/// Farthest that the pad's centre may leave the planned line where a corner is blended: what
+/// straight joint lines between knots leave it by anyway. \[m\]
+const LINE_TOLERANCE: f64 = 1.5e-4;
+/// A blend is checked for collisions on chords that leave it by no more than this. \[rad\]
+const CHORD: f64 = 2e-4;
+
+/// The same path as `plan` (which must be of [`Profile::Velocity`]), its corners blended within
+/// [`LINE_TOLERANCE`] on the surface and clear of collision everywhere, as fast as the limits
+/// allow. In the corners at the knots `stops`, and where no blend fits, the arm comes to rest.
+#[must_use]
+pub fn accelerate(plan: &Plan, cell: Workcell<'_>, limits: &Limits, stops: &[usize]) -> Plan {
+    let points: Vec<JointVector> = plan.knots.iter().map(|k| k.q).collect();
+    let judge = Judge { plan, cell };
+    let runs = smooth(&points, &|i, halves| !stops.contains(&i) && judge.fits(i, halves));
+    let knots = timed(&runs, limits).iter().map(|t| knot(&plan.knots, t)).collect();
+    Plan { profile: Profile::Acceleration, knots, ..plan.clone() }
+}
+
+/// The way to rest from a knot of a plan with limited acceleration, along its own path.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rest {
+    /// From the knot, at time 0, to where the arm stands.
+    pub knots: Vec<PlanKnot>,
+    /// The knot of the plan where that is.
+    pub at: usize,
+}
+
+impl Rest {
+    /// Brakes on the plan's path from its knot on. While the plan itself leaves no reserve for
+    /// braking, it is followed to the bit. `None` if the plan has no such knot.
+    #[must_use]
+    pub fn after(plan: &Plan, knot: usize, limits: &Limits) -> Option<Self> {
+        let knots = plan.knots.get(knot..)?;
+        let first = knots.first()?;
+        let stands = |k: &PlanKnot| k.v == JointVector::default();
+        let early = |k: &PlanKnot| PlanKnot { time_ns: k.time_ns - first.time_ns, ..*k };
+        for m in 0..knots.len() {
+            let followed = || knots[..=m].iter().map(early);
+            if stands(&knots[m]) {
+                return Some(Self { knots: followed().collect(), at: knot + m });
+            }
+            let natural = (m..knots.len()).find(|&k| stands(&knots[k])).unwrap_or(knots.len() - 1);
+            let mut more = 1;
+            while m + more <= natural {
+                let ahead = &knots[m..=m + more];
+                if let Some(brake) = braked(&along(ahead), limits, RESERVE) {
+                    let start = knots[m].time_ns - first.time_ns;
+                    let braking = brake[1..].iter().map(|t| {
+                        let own = self::knot(ahead, t);
+                        PlanKnot { time_ns: own.time_ns + start, ..own }
+                    });
+                    let way = followed().chain(braking).collect();
+                    return Some(Self { knots: way, at: knot + m + more });
+                }
+                more = (more + 1).max(more * 5 / 4);
+            }
+        }
+        None
+    }
+
+    /// Puts this motion before a plan that starts where it ends.
+    #[must_use]
+    pub fn then(&self, plan: Plan) -> Plan {
+        let start = self.knots.last().map_or(0, |k| k.time_ns);
+        let rest = plan.knots.iter().skip(1);
+        let later = rest.map(|k| PlanKnot { time_ns: k.time_ns + start, ..*k });
+        let knots = self.knots.iter().copied().chain(later).collect();
+        Plan { knots, ..plan }
+    }
+}
+
+/// Share of the limits that a braking may use.
+const RESERVE: f64 = 0.95;
+
+/// The path of a plan's cubics with their time as parameter: two quadratics for each, which meet
+/// them in position and velocity at both ends and stay within their accelerations.
+fn along(knots: &[PlanKnot]) -> Run {
+    let mut run = Run::default();
+    for (i, pair) in knots.windows(2).enumerate() {
+        let (a, b) = (&pair[0], &pair[1]);
+        let seconds = (b.time_ns - a.time_ns) as f64 * 1e-9;
+        let at = i as f64;
+        // From (A + B) h/2 = Δv and (3A + B) h²/8 = Δq − v h.
+        let bend = |j: usize| {
+            let change = (b.v[j] - a.v[j]) / seconds;
+            let mean = (b.q[j] - a.q[j] - a.v[j] * seconds) / (seconds * seconds);
+            (4.0 * mean - change, 3.0 * change - 4.0 * mean)
+        };
+        let half = 0.5 * seconds;
+        let first = Piece {
+            length: half,
+            start: a.q,
+            slope: a.v,
+            bend: std::array::from_fn(|j| bend(j).0),
+            source: [at, at + 0.5],
+        };
+        let second = Piece {
+            length: half,
+            start: first.at(half),
+            slope: first.slope_at(half),
+            bend: std::array::from_fn(|j| bend(j).1),
+            source: [at + 0.5, at + 1.0],
+        };
+        run.pieces.extend([first, second]);
+    }
+    run
+}
+
+/// A moment as a knot, with what the points that its path was made from say of it.
+fn knot(points: &[PlanKnot], moment: &Timed) -> PlanKnot {
+    let share = moment.source.fract();
+    let before = &points[(moment.source as usize).min(points.len() - 1)];
+    let own = PlanKnot { time_ns: moment.time_ns, q: moment.q, v: moment.v, ..*before };
+    if share == 0.0 {
+        return own;
+    }
+    let line = match (before.line, points.get(moment.source as usize + 1).and_then(|k| k.line)) {
+        (Some(a), Some(b)) => Some(std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))),
+        _ => None,
+    };
+    PlanKnot { line, patch: None, ..own }
+}
+
+/// Whether a blend may be.
+struct Judge<'a> {
+    plan: &'a Plan,
+    cell: Workcell<'a>,
+}
+
+impl Judge<'_> {
+    fn fits(&self, i: usize, halves: &[Piece; 2]) -> bool {
+        self.is_on_line(i, halves) && self.is_free(i, halves)
+    }
+
+    /// The pad's centre near the planned line, where there is one.
+    fn is_on_line(&self, i: usize, halves: &[Piece; 2]) -> bool {
+        let Some(corner) = self.plan.line(i) else { return true };
+        let contact = self.cell.tool.contact_in_tip();
+        let pad = |q: &JointVector| {
+            Point3::from((self.cell.arm.tip_pose(q) * contact).translation.vector)
+        };
+        let near = |q: &JointVector, other: Option<Point3<f64>>| {
+            let end = other.unwrap_or(corner);
+            to_segment(&pad(q), &corner, &end) <= LINE_TOLERANCE
+        };
+        let (before, after) = (
+            self.plan.line(i - 1).filter(|_| self.plan.on_surface(i)),
+            self.plan.line(i + 1).filter(|_| self.plan.on_surface(i + 1)),
+        );
+        let middle = halves[1].start;
+        let looks = [0.25, 0.5, 0.75];
+        let ok = |half: &Piece, line: Option<Point3<f64>>| {
+            line.is_none() || looks.iter().all(|share| near(&half.at(share * half.length), line))
+        };
+        (near(&middle, before) || near(&middle, after))
+            && ok(&halves[0], before)
+            && ok(&halves[1], after)
+    }
+
+    /// No collision on the blend's chords. Where the pad is on the surface on either side, or is
+    /// being lifted off it, it may touch.
+    fn is_free(&self, i: usize, halves: &[Piece; 2]) -> bool {
+        let on_surface = self.plan.on_surface(i) || self.plan.on_surface(i + 1);
+        let parts = (cut(halves, &self.plan.knots[i].q) / (4.0 * CHORD)).sqrt().ceil().max(1.0);
+        let chords = |half: &Piece| -> Vec<JointVector> {
+            (0..=parts as usize).map(|k| half.at(half.length * k as f64 / parts)).collect()
+        };
+        let free = |contact: ToolContact| {
+            halves.iter().all(|half| {
+                let points = chords(half);
+                points.windows(2).all(|w| self.cell.world.motion_free(&w[0], &w[1], contact))
+            })
+        };
+        if on_surface {
+            return free(ToolContact::Allowed);
+        }
+        let knots = &self.plan.knots;
+        let lifts = || {
+            [(i - 1, i), (i, i + 1)].into_iter().any(|(a, b)| {
+                let (a, b) = (&knots[a].q, &knots[b].q);
+                !self.cell.world.motion_free(a, b, ToolContact::Forbidden)
+            })
+        };
+        free(ToolContact::Forbidden) || (lifts() && free(ToolContact::Allowed))
+    }
+}
+
+fn to_segment(p: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>) -> f64 {
+    let along = b - a;
+    let length = along.norm_squared();
+    let share = if length > 0.0 { ((p - a).dot(&along) / length).clamp(0.0, 1.0) } else { 0.0 };
+    (p - (a + along * share)).norm()
+}

@@ -1,0 +1,53 @@
+//! Joint path to timed knots: bang-bang velocity, or time-optimal under limited acceleration.
+
+mod accelerate;
+mod bang_bang;
+mod optimal;
+mod run;
+mod sampled;
+mod smooth;
+
+pub use accelerate::{Rest, accelerate};
+pub use bang_bang::{bang_bang, segment_ns};
+pub use run::{Piece, Run};
+pub use sampled::{Timed, timed};
+pub use smooth::smooth;
+
+use nullsweep_robot::{Arm, JointVector};
+use serde::{Deserialize, Serialize};
+
+use crate::cost;
+
+/// How fast a plan goes along its path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Profile {
+    /// Every straight segment as fast as its slowest joint allows: bang-bang velocity, as in the
+    /// paper. Joints change their speed at once, so a real arm lags.
+    #[default]
+    Velocity,
+    /// As fast as velocity and acceleration allow, corners blended.
+    Acceleration,
+}
+
+/// What the joints may do. 0 in unused lanes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// \[rad/s\] or \[m/s\]
+    pub velocity: JointVector,
+    /// \[rad/s²\] or \[m/s²\]
+    pub acceleration: JointVector,
+}
+
+impl Limits {
+    /// The arm's own, with one velocity for all joints where that is lower.
+    #[must_use]
+    pub fn of(arm: &Arm, v_max: Option<f64>) -> Self {
+        let mut limits =
+            Self { velocity: cost::velocities(arm, v_max), acceleration: JointVector::default() };
+        for (a, joint) in limits.acceleration.iter_mut().zip(arm.limits()) {
+            *a = joint.acceleration;
+        }
+        limits
+    }
+}
