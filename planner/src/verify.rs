@@ -137,7 +137,7 @@ fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
     let mut found = Vec::new();
     let mut report = |knot, kind, detail| found.push(Violation { knot, kind, detail });
     for (k, knot) in plan.knots.iter().enumerate() {
-        if knot.q.iter().any(|v| !v.is_finite()) {
+        if knot.q.iter().chain(&knot.v).any(|v| !v.is_finite()) {
             report(k, ViolationKind::NotFinite, format!("{:?}", knot.q));
         }
         let before = k.checked_sub(1).map(|b| &plan.knots[b]);
@@ -151,13 +151,13 @@ fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
         for (j, name) in arm.joint_names().iter().enumerate() {
             let limits = &arm.limits()[j];
             let velocity = curve.top_speed(j);
-            if !(velocity <= limits.velocity * (1.0 + 1e-9)) {
+            if velocity > limits.velocity * (1.0 + 1e-9) {
                 let detail = format!("{name}: {velocity:.4} of {:.4}", limits.velocity);
                 report(k, ViolationKind::Velocity, detail);
             }
             if plan.profile == Profile::Acceleration {
                 let acceleration = curve.top_acceleration(j);
-                if !(acceleration <= limits.acceleration * (1.0 + ROUNDING)) {
+                if acceleration > limits.acceleration * (1.0 + ROUNDING) {
                     let detail = format!("{name}: {acceleration:.4} of {:.4}", limits.acceleration);
                     report(k, ViolationKind::Acceleration, detail);
                 }

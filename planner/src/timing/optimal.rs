@@ -83,7 +83,7 @@ impl Rows {
         let half = 0.5 / interval.length;
         for j in 0..MAX_DOF {
             let limit = limits.acceleration[j] * interval.share;
-            if !(limit > 0.0) {
+            if limit <= 0.0 {
                 continue;
             }
             // u = (y − x) / 2Δ.
@@ -140,11 +140,11 @@ impl Rows {
             };
             let ((ml, cl), (mh, ch)) = (line(below, low, false), line(above, high, true));
             let next = (ch - cl) / (ml - mh);
-            if !(next < x) {
+            if next < x {
+                x = next.max(0.0);
+            } else {
                 // Rounding: the lines meet here.
                 x *= 1.0 - 1e-12;
-            } else {
-                x = next.max(0.0);
             }
         }
         // Rounding may leave a gap of a few ulp: a little less speed fits.
