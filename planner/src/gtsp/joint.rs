@@ -7,12 +7,14 @@ use super::table::{LANES, Table};
 #[derive(Clone, Copy)]
 pub(super) struct Joint<'a> {
     into: &'a [i32],
+    /// Cheapest entry of each of the block's rows.
+    lows: &'a [i32],
     block: &'a [i32],
     out: &'a [i32],
     /// What the rows leave out.
     add: i64,
-    /// Cheapest arc of the block and cheapest way out.
-    rest: i32,
+    /// Cheapest way out.
+    least_out: i32,
     /// No choice of nodes costs less.
     pub(super) bound: i64,
 }
@@ -23,9 +25,12 @@ impl<'a> Joint<'a> {
         let (add_in, into) = table.row(p.0, p.1, a);
         let (add, block) = table.open_block(a, b);
         let (add_out, out) = table.column(b, q.0, q.1);
-        let rest = table.low(a, b) - add + smallest(out);
+        let lows = table.row_lowest(a, b);
+        let least_out = smallest(out);
         let add = i64::from(add_in) + i64::from(add) + i64::from(add_out);
-        Self { into, block, out, add, rest, bound: add + i64::from(rest + smallest(into)) }
+        let ways = into.iter().zip(lows).map(|(d, low)| d + low);
+        let bound = add + i64::from(ways.min().unwrap_or(0) + least_out);
+        Self { into, lows, block, out, add, least_out, bound }
     }
 
     /// Cost of the best choice if it is below `limit`, else something that is not.
@@ -36,13 +41,13 @@ impl<'a> Joint<'a> {
         }
         let width = self.out.len();
         // Rows that cannot get below the limit are left out.
-        let allowed = (limit - self.add - i64::from(self.rest)).min(i64::from(i32::MAX)) as i32;
+        let allowed = (limit - self.add - i64::from(self.least_out)).min(i64::from(i32::MAX)) as i32;
         let mut best = i32::MAX;
         let mut start = 0;
         while start < width {
             let mut ways = [i32::MAX; LANES];
-            for (i, &d) in self.into.iter().enumerate() {
-                if d < allowed {
+            for (i, (&d, &low)) in self.into.iter().zip(self.lows).enumerate() {
+                if d + low < allowed {
                     let at = i * width + start;
                     for (w, x) in ways.iter_mut().zip(&self.block[at..at + LANES]) {
                         *w = (*w).min(d + x);

@@ -30,6 +30,9 @@ pub(super) struct Table {
     transposed: Vec<u32>,
     data: Vec<i32>,
     lowest: Vec<i32>,
+    /// The cheapest entry of each row of each block, and where a pair's begin.
+    row_lowest: Vec<i32>,
+    row_starts: Vec<u32>,
     near_out: Vec<u32>,
     near_in: Vec<u32>,
     near_cost: Vec<i32>,
@@ -263,6 +266,17 @@ impl Table {
             };
         }
         data.extend_from_slice(&[0; LANES]);
+        let mut row_lowest = vec![0; widest];
+        let mut row_starts = vec![0; m * m];
+        for (a, b) in raw.pairs() {
+            let at = pairs[a * m + b].at as usize;
+            if at != 0 {
+                let (x, y) = (sizes[a] as usize, sizes[b] as usize);
+                row_starts[a * m + b] = row_lowest.len() as u32;
+                let rows = data[at..at + x * y].chunks_exact(y);
+                row_lowest.extend(rows.map(|row| row.iter().copied().min().unwrap_or(0)));
+            }
+        }
         let mut table = Self {
             m,
             root,
@@ -273,6 +287,8 @@ impl Table {
             transposed,
             data,
             lowest,
+            row_lowest,
+            row_starts,
             near_out: Vec::new(),
             near_in: Vec::new(),
             near_cost: Vec::new(),
@@ -364,6 +380,13 @@ impl Table {
     pub(super) fn open_block(&self, a: u32, b: u32) -> (i32, &[i32]) {
         let pair = self.pairs[a as usize * self.m + b as usize];
         (pair.add, &self.data[pair.at as usize..])
+    }
+
+    /// For each node of `a` the cheapest entry of its row in [`Self::open_block`].
+    #[inline]
+    pub(super) fn row_lowest(&self, a: u32, b: u32) -> &[i32] {
+        let at = self.row_starts[a as usize * self.m + b as usize] as usize;
+        &self.row_lowest[at..at + self.sizes[a as usize] as usize]
     }
 
     /// Clusters that are cheap to reach from `a`, nearest first, with the cheapest arc.
