@@ -36,6 +36,7 @@ pub mod pipeline;
 pub mod progress;
 
 pub mod cli;
+pub mod export;
 pub mod publish;
 pub mod report;
 

@@ -1,6 +1,7 @@
 //! The command line of `planner`.
 
 mod bars;
+mod export;
 mod inspect;
 mod picture;
 mod plan;
@@ -42,6 +43,8 @@ enum Command {
     Publish(publish::PublishArgs),
     /// Solve a generalized travelling-salesman file.
     Gtsp(crate::gtsp::cli::GtspArgs),
+    /// Write a plan as a trajectory for other programs.
+    Export(export::ExportArgs),
     /// Say what a plan file holds.
     Inspect(inspect::InspectArgs),
 }
@@ -61,6 +64,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Gtsp(args) => crate::gtsp::cli::run(&args, &mut std::io::stdout().lock())
             .map(|()| OK)
             .map_err(anyhow::Error::from),
+        Command::Export(args) => export::run(&args),
         Command::Inspect(args) => inspect::run(&args),
     };
     match result {
