@@ -38,6 +38,7 @@ pub mod progress;
 pub mod cli;
 pub mod export;
 pub mod publish;
+pub mod replan;
 pub mod report;
 
 mod fit;

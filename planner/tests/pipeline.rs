@@ -84,7 +84,7 @@ fn a_plan_goes_on_from_a_knot_and_survives_its_file() {
 
     let knot = plan.knots.len() / 3;
     let (start, digest) = (plan.knots[knot].q, plan.digest());
-    let after = Some(After { plan, knot, again: false });
+    let after = Some(After { plan, knot, held: None, again: false });
     let second =
         plan_on(2, &seat, &Job { after, ..job(&seat, Method::Curvature, CostKind::Effort) });
     check(&second);
@@ -148,7 +148,7 @@ fn limited_acceleration_keeps_line_limits_and_joins_in_motion() {
     let middle = knots.len() / 3..knots.len() / 2;
     let knot = middle.max_by(|a, b| speed(*a).total_cmp(&speed(*b))).expect("knots");
     let (q, v) = (knots[knot].q, knots[knot].v);
-    let after = Some(After { plan: first.plan, knot, again: false });
+    let after = Some(After { plan: first.plan, knot, held: None, again: false });
     let second = plan_on(2, &seat, &Job { after, ..job });
     check(&second);
     assert_eq!((second.plan.knots[0].q, second.plan.knots[0].v), (q, v));

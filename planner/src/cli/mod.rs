@@ -6,6 +6,7 @@ mod inspect;
 mod picture;
 mod plan;
 mod publish;
+mod replan;
 
 pub use picture::{joint_axes, motion};
 
@@ -41,6 +42,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     /// Send a plan to the executor.
     Publish(publish::PublishArgs),
+    /// Replace the plan that runs by one for what it has not swept yet, without a stop.
+    Replan(Box<replan::ReplanArgs>),
     /// Solve a generalized travelling-salesman file.
     Gtsp(crate::gtsp::cli::GtspArgs),
     /// Write a plan as a trajectory for other programs.
@@ -61,6 +64,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match cli.command {
         Command::Plan(args) => plan::run(&args),
         Command::Publish(args) => publish::run(&args),
+        Command::Replan(args) => replan::run(&args),
         Command::Gtsp(args) => crate::gtsp::cli::run(&args, &mut std::io::stdout().lock())
             .map(|()| OK)
             .map_err(anyhow::Error::from),

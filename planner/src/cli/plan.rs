@@ -218,6 +218,18 @@ impl FromStr for KnotOf {
 }
 
 pub(super) fn run(args: &PlanArgs) -> anyhow::Result<u8> {
+    let after = match &args.after {
+        None => None,
+        Some(KnotOf { plan, knot }) => {
+            let plan = Plan::read(plan)?;
+            Some(After { plan, knot: *knot, held: None, again: args.again })
+        }
+    };
+    Ok(make(args, after)?.0)
+}
+
+/// Makes a plan, writes what was asked for, and gives the exit code with it.
+pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8, Plan)> {
     let bars = Bars::new();
     let robot = match &args.urdf {
         Some(path) => Robot::from_urdf_file(path)?,
@@ -225,11 +237,19 @@ pub(super) fn run(args: &PlanArgs) -> anyhow::Result<u8> {
     };
     bars.stage("scan", None);
     let scene = scene(args, &bars)?;
-    let job = job(args, &scene)?;
+    let job = job(args, &scene, after)?;
     let outcome = pipeline::run(&robot, &scene.surface, &job, &bars);
     bars.clear();
     let outcome = outcome?;
-    finish(args, &outcome)
+    Ok((finish(args, &outcome)?, outcome.plan))
+}
+
+impl PlanArgs {
+    /// Whether they say where the plan begins or where the robot stands.
+    pub(super) fn is_placed(&self) -> bool {
+        let stands = !matches!(self.base, Base::Auto) || self.torso.is_some();
+        self.after.is_some() || !self.start.is_empty() || !self.held.is_empty() || stands
+    }
 }
 
 /// Writes what was asked for and prints the table.
@@ -420,19 +440,13 @@ fn table_under(scan: &Scan, height: f64) -> Obstacle {
     }
 }
 
-fn job(args: &PlanArgs, scene: &Scene) -> anyhow::Result<Job> {
+fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<Job> {
     let tool = match &args.tool {
         None => Tool::default(),
         Some(path) => {
             let text = std::fs::read_to_string(path)
                 .with_context(|| format!("cannot read {}", path.display()))?;
             toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))?
-        }
-    };
-    let after = match &args.after {
-        None => None,
-        Some(KnotOf { plan, knot }) => {
-            Some(After { plan: Plan::read(plan)?, knot: *knot, again: args.again })
         }
     };
     let stance = match (&after, args.base) {

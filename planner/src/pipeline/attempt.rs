@@ -308,6 +308,7 @@ impl Shop<'_> {
             continues: job
                 .after
                 .as_ref()
+                .filter(|a| a.held.is_none())
                 .map(|a| Continues { digest: a.plan.digest(), knot: a.knot as u32 }),
         }
     }

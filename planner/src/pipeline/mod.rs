@@ -84,8 +84,11 @@ pub enum StanceChoice {
 pub struct After {
     /// The other plan.
     pub plan: Plan,
-    /// The new plan's start.
+    /// The new plan's start, or the last knot that was passed.
     pub knot: usize,
+    /// Where the arm was stopped past that knot and is held: then the plan starts there. \[rad\] or
+    /// \[m\]
+    pub held: Option<JointVector>,
     /// Whether patches that the other plan has swept by then are swept again.
     pub again: bool,
 }
@@ -228,6 +231,12 @@ pub enum PipelineError {
         /// How many patches are reachable.
         reachable: usize,
     },
+    /// The plan to go on from has swept everything.
+    #[error("every reachable patch is swept by knot {knot}: nothing is left to plan")]
+    NothingLeft {
+        /// The knot to go on from.
+        knot: usize,
+    },
     /// The knot to go on from does not exist.
     #[error("the plan to continue has {knots} knots, there is no knot {knot}")]
     NoSuchKnot {
@@ -266,6 +275,7 @@ pub fn run(
     let mut rest = None;
     if let (Some(after), Profile::Acceleration) = (&job.after, job.profile)
         && after.plan.profile == Profile::Acceleration
+        && after.held.is_none()
     {
         rest = Rest::after(&after.plan, after.knot, &Limits::of(&arm, None));
     }
@@ -305,6 +315,9 @@ pub fn run(
     let mut visit = reached.clone();
     if job.after.as_ref().is_some_and(|after| !after.again) {
         leave_out_swept(&mut visit, &patches, &already);
+        if let (Some(after), false) = (&job.after, visit.iter().any(Option::is_some)) {
+            return Err(PipelineError::NothingLeft { knot: after.knot });
+        }
     }
     let mut best = shop.attempt(patches, visit, None, &mut clock)?;
     for _ in 0..job.refinements {

@@ -114,7 +114,9 @@ const WELL_JOINED: usize = 4;
 
 /// The joint vector that the plan starts from.
 pub(super) fn start(job: &Job, arm: &Arm, world: &World) -> Result<JointVector, PipelineError> {
-    if let Some(after) = &job.after {
+    if let Some(after) = &job.after
+        && after.held.is_none()
+    {
         let knots = after.plan.knots.len();
         return after
             .plan
@@ -123,7 +125,8 @@ pub(super) fn start(job: &Job, arm: &Arm, world: &World) -> Result<JointVector, 
             .map(|k| k.q)
             .ok_or(PipelineError::NoSuchKnot { knots, knot: after.knot });
     }
-    let start = job.start.unwrap_or_else(|| arm.home());
+    let held = job.after.as_ref().and_then(|after| after.held);
+    let start = held.or(job.start).unwrap_or_else(|| arm.home());
     for (j, &(low, high)) in arm.margined_limits().iter().enumerate() {
         if !(low..=high).contains(&start[j]) {
             let joint = arm.joint_names()[j].clone();

@@ -6,5 +6,6 @@ mod kill;
 mod mock;
 mod publish;
 mod reject;
+mod replan;
 mod rig;
 mod run;

@@ -1,0 +1,132 @@
+//! `planner replan` while the arm sweeps: in passing, and by a stop where it came too late.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use nullsweep_ipc_types::{EventKind, PlanEvent, Reason};
+use nullsweep_planner::plan::Plan;
+use nullsweep_tests::stage::{Part, Stage};
+use nullsweep_tests::system::System;
+use nullsweep_tests::witness::PATIENCE;
+
+use crate::common::{stage, verdict};
+use crate::rig;
+
+/// A part of the simulated chair's seat: about 20 s of sweeping.
+const SCENE: [&str; 12] = [
+    "--demo",
+    "chair-seat",
+    "--crop=-0.15,-0.10,0.35,0.10,0.10,0.60",
+    "--method",
+    "tsp",
+    "--ik-samples",
+    "12",
+    "--refinements",
+    "0",
+    "--v-max",
+    "1.0",
+    "--out",
+];
+
+/// Runs the planner to its end; its exit code and all that it said.
+fn planner(stage: &Stage, name: &str, args: &[OsString]) -> (Option<i32>, String) {
+    let mut process = stage.start(Part::Planner, name, args).expect("the planner starts");
+    let status = process.wait(4 * PATIENCE).expect("known").expect("it ends");
+    (status.code(), format!("{}{}", process.stdout(), process.stderr()))
+}
+
+fn args(command: &str, out: &Path, more: &[&str]) -> Vec<OsString> {
+    let scene = SCENE.iter().map(OsString::from).chain([out.into()]);
+    std::iter::once(command.into()).chain(scene).chain(more.iter().map(OsString::from)).collect()
+}
+
+/// A system that sweeps by a first plan, and that plan's file.
+fn sweeping(stage: &Stage) -> (System, PathBuf) {
+    let path = stage.file("first.json");
+    let place = ["--cost", "effort", "--base=0.1,0.55,-1.2", "--torso", "0.2"];
+    let (code, said) = planner(stage, "plan", &args("plan", &path, &place));
+    assert_eq!(code, Some(0), "{said}");
+    let mut system = rig::start(stage, &["--plan", path.to_str().expect("UTF-8")]);
+    let mut publish: Vec<OsString> = vec!["publish".into(), path.clone().into()];
+    publish.extend(stage.place());
+    let (code, said) = planner(stage, "publish", &publish);
+    assert_eq!(code, Some(0), "{said}");
+    system.witness.see("motion", |t| t.plan.is_some() && t.knot > 0).expect("it moves");
+    (system, path)
+}
+
+fn replan(stage: &Stage, running: &Path, out: &Path, lead: &str) -> (Option<i32>, String) {
+    let running = running.to_str().expect("UTF-8");
+    let mut all = args("replan", out, &["--running", running, "--cost", "time", "--lead", lead]);
+    all.extend(stage.place());
+    planner(stage, "replan", &all)
+}
+
+/// The end of the first plan, and the start of the second.
+fn ends(system: &mut System) -> (PlanEvent, PlanEvent) {
+    let first = system.witness.events().first().expect("events").plan;
+    let old = system.witness.end(first).expect("an end");
+    let started = EventKind::Started.wire();
+    let new = system
+        .witness
+        .until("the second plan's start".into(), |w| {
+            w.events().iter().find(|e| e.plan != first && e.kind == started).copied()
+        })
+        .expect("it starts");
+    (old, new)
+}
+
+#[test]
+fn a_sweep_goes_on_under_another_cost_without_a_stop() {
+    let stage = stage();
+    let (mut system, first) = sweeping(&stage);
+    let second = stage.file("second.json");
+    let (code, said) = replan(&stage, &first, &second, "12");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("without a stop"), "the machine is too slow for this test: {said}");
+
+    let (old, new) = ends(&mut system);
+    assert_eq!(old.kind, EventKind::Superseded.wire());
+    let (first, second) = (Plan::read(&first).expect("read"), Plan::read(&second).expect("read"));
+    let knot = second.continues.as_ref().expect("it continues the first one").knot as usize;
+    assert_eq!(second.knots[0].q, first.knots[knot].q);
+    let visited = |plan: &Plan| plan.knots.iter().filter(|k| k.patch.is_some()).count();
+    assert!(visited(&second) < visited(&first), "only what is left is swept");
+
+    system.executor.terminate(PATIENCE).expect("it ends");
+    let found = verdict(&stage, &mut system.mock);
+    assert_eq!(found["violations"], 0, "{found:#}");
+    let runs = found["verdict"]["plans"].as_array().expect("plans");
+    let join = runs.iter().find(|r| r["plan"] == new.plan.to_string()).expect("it ran");
+    assert!(join["join_step_ratio"].as_f64() > Some(0.0), "the arm was on its way: {join}");
+}
+
+#[test]
+fn a_plan_that_comes_too_late_goes_on_from_where_the_arm_was_stopped() {
+    let stage = stage();
+    let (mut system, first) = sweeping(&stage);
+    let second = stage.file("second.json");
+    // The next knot has passed before anything can be planned.
+    let (code, said) = replan(&stage, &first, &second, "0");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("the arm holds past knot"), "{said}");
+    let (old, _) = ends(&mut system);
+    assert_eq!((old.kind, old.reason), (EventKind::Aborted.wire(), Reason::Stopped.wire()));
+    assert!(Plan::read(&second).expect("read").continues.is_none());
+    system.executor.terminate(PATIENCE).expect("it ends");
+    let found = verdict(&stage, &mut system.mock);
+    assert_eq!(found["violations"], 0, "{found:#}");
+}
+
+#[test]
+fn without_a_running_plan_there_is_nothing_to_replan() {
+    let stage = stage();
+    let path = stage.file("first.json");
+    let place = ["--base=0.1,0.55,-1.2", "--torso", "0.2"];
+    let (code, said) = planner(&stage, "plan", &args("plan", &path, &place));
+    assert_eq!(code, Some(0), "{said}");
+    let _system = rig::start(&stage, &["--plan", path.to_str().expect("UTF-8")]);
+    let (code, said) = replan(&stage, &path, &stage.file("second.json"), "5");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("executes no plan"), "{said}");
+}
