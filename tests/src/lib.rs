@@ -8,11 +8,13 @@
 //!   [`system`]: mock and executor on a stage, from their start to the verdict.
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
 //! * [`witness`]: watches an executor from outside.
+//! * [`conformance`]: whether any endpoint keeps what the executor relies on.
 //! * [`latency`]: the latency lab; [`kills`]: the killing lab; [`loopback`]: executor and endpoint
 //!   under a virtual clock.
 
 pub mod arm_args;
 pub mod clock;
+pub mod conformance;
 pub mod demo;
 pub mod endpoint;
 pub mod fault;

@@ -1,0 +1,77 @@
+//! The one suite for endpoints, on the mock under a virtual clock, on the mock as a process, and on
+//! endpoints that are broken on purpose, each of which must break its own rule.
+
+use std::ffi::OsString;
+use std::process::Command;
+
+use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
+use nullsweep_tests::conformance::{Rig, Terms, VirtualClock, VirtualEndpoint, suite};
+use nullsweep_tests::endpoint::{Behaviour, Endpoint, Fidelity};
+use nullsweep_tests::judge::Rules;
+use nullsweep_tests::stage::Stage;
+use nullsweep_tests::system::start_mock;
+
+fn right_arm() -> Arm {
+    Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("the PR2 has a right arm")
+}
+
+/// The names of the rules that an endpoint breaks, each with what was found.
+fn broken_by(behaviour: Behaviour) -> Vec<(&'static str, String)> {
+    let (arm, clock) = (right_arm(), VirtualClock::default());
+    let endpoint = Endpoint::new(&arm, arm.home(), behaviour, clock.now_ns()).expect("a PR2 arm");
+    let mut rig = Rig::new(VirtualEndpoint::new(endpoint, clock.clone()), clock, &arm);
+    suite(&mut rig, &Terms::default(), |_| true)
+        .into_iter()
+        .filter_map(|f| Some((f.name, f.broken?)))
+        .collect()
+}
+
+#[test]
+fn the_mock_keeps_every_rule() {
+    for fidelity in [Fidelity::Servo, Fidelity::Mechanism] {
+        let broken = broken_by(Behaviour { fidelity, ..Behaviour::default() });
+        assert!(broken.is_empty(), "{fidelity:?}: {broken:?}");
+    }
+}
+
+#[test]
+fn a_broken_endpoint_breaks_its_own_rule() {
+    for (fault, rule) in [
+        ("count@0s", "shape"),
+        ("nan@0s", "shape"),
+        ("uncalibrated@0s", "shape"),
+        ("halt@0s", "shape"),
+        ("stale@0s", "shape"),
+        ("freeze@0s", "follow"),
+        ("deaf@0s", "follow"),
+    ] {
+        let faults = vec![fault.parse().expect("a fault")];
+        let broken = broken_by(Behaviour { faults, ..Behaviour::default() });
+        let names: Vec<_> = broken.iter().map(|(name, _)| *name).collect();
+        assert!(names.contains(&rule), "{fault}: {broken:?}");
+    }
+    // No watchdog of its own, and none that refuses.
+    let rules = Rules { session_timeout_ns: 3_600_000_000_000, ..Rules::default() };
+    let broken = broken_by(Behaviour { rules, ..Behaviour::default() });
+    let names: Vec<_> = broken.iter().map(|(name, _)| *name).collect();
+    assert!(names.contains(&"watchdog"), "{broken:?}");
+    let rules = Rules { start_tolerance: 1.0, ..Rules::default() };
+    let broken = broken_by(Behaviour { rules, ..Behaviour::default() });
+    let names: Vec<_> = broken.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, ["refuse"], "{broken:?}");
+}
+
+/// Against a process, as a user runs it. A loaded machine may stall either side, so the time until
+/// the watchdog is generous.
+#[test]
+fn the_mock_process_keeps_every_rule() {
+    let stage = Stage::new(env!("CARGO_BIN_EXE_demo"), "pr2").expect("a folder");
+    let mock = start_mock(&stage, "mock", ["--timeout", "500"]).expect("the mock starts");
+    let mut args: Vec<OsString> = stage.place().to_vec();
+    args.extend(["--grace", "2000", "--speed", "0.3", "--dare"].map(OsString::from));
+    let run = Command::new(env!("CARGO_BIN_EXE_conformance")).args(args).output().expect("it runs");
+    let said = String::from_utf8_lossy(&run.stdout);
+    let complained = String::from_utf8_lossy(&run.stderr);
+    assert_eq!(run.status.code(), Some(0), "{said}{complained}\nmock: {}", mock.stderr());
+    assert_eq!(said.matches("kept").count(), 10, "{said}");
+}
