@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail, ensure};
 use clap::Parser;
-use nullsweep_ipc_types::{CommandKind, EventKind, Mode, PlanId};
+use nullsweep_ipc_types::{CommandKind, EventKind, Mode, PlanId, Reason};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,11 +19,11 @@ use serde_json::Value;
 
 use crate::parts;
 use crate::stage::{Part, Process, Stage};
-use crate::system::{System, start_executor, start_mock};
+use crate::system::{PATIENT, PATIENT_MOCK, System, start_executor, start_mock};
 use crate::witness::PATIENCE;
 
-/// Mock and executor run as they come.
-const NO_OPTIONS: [&str; 0] = [];
+/// How often a motion may be broken off by a stall of the machine before it counts as a failure.
+const TRIES: usize = 5;
 /// Longest time from the start of a motion to the kill. \[ms\]
 const LONGEST_MS: u64 = 1500;
 
@@ -57,6 +57,8 @@ struct Lab<'a> {
     starts: usize,
     violations: u64,
     timeouts: u64,
+    /// Motions that a stall of the machine ended, each by the executor's rule.
+    stalls: u64,
 }
 
 /// Runs with the arguments of a command line, program name first.
@@ -115,8 +117,8 @@ fn kill_all(args: &Args, stage: &Stage) -> anyhow::Result<()> {
     println!(
         "{done} kills ({} of each): every plan had its one end, the arm held or stopped by the \
          rule, all restarts went by themselves; {} violations at the endpoint, which stopped by \
-         itself {} times",
-        args.each, lab.violations, lab.timeouts
+         itself {} times; {} motions were stopped by the executor's rule as the machine stalled",
+        args.each, lab.violations, lab.timeouts, lab.stalls
     );
     ensure!(lab.violations == 0, "the endpoint saw {} violations", lab.violations);
     Ok(())
@@ -124,8 +126,8 @@ fn kill_all(args: &Args, stage: &Stage) -> anyhow::Result<()> {
 
 impl<'a> Lab<'a> {
     fn start(stage: &'a Stage) -> anyhow::Result<Self> {
-        let system = System::start(stage, NO_OPTIONS, NO_OPTIONS)?;
-        Ok(Self { stage, system, starts: 1, violations: 0, timeouts: 0 })
+        let system = System::start(stage, PATIENT_MOCK, PATIENT)?;
+        Ok(Self { stage, system, starts: 1, violations: 0, timeouts: 0, stalls: 0 })
     }
 
     /// One motion from where the arm is, one kill in it, and everything whole again.
@@ -138,14 +140,18 @@ impl<'a> Lab<'a> {
             Victim::Planner => {
                 planner.kill()?;
                 let end = self.system.witness.end(plan)?;
-                ensure!(end.kind == EventKind::Finished.wire(), "the plan did not run to its end");
-                self.system.witness.mode(Mode::Hold)?;
+                if end.kind != EventKind::Finished.wire() {
+                    // The executor keeps its rules also on a machine that stalls.
+                    ensure!(end.reason == Reason::Fault.wire(), "the plan did not run to its end");
+                    self.stalls += 1;
+                }
+                self.reset()?;
             }
             Victim::Executor => {
                 self.system.executor.kill()?;
                 self.starts += 1;
                 let name = format!("executor-{}", self.starts);
-                self.system.executor = start_executor(self.stage, &name, NO_OPTIONS)?;
+                self.system.executor = start_executor(self.stage, &name, PATIENT)?;
                 let held = self.system.witness.mode(Mode::Hold)?;
                 ensure!(held.plan == PlanId::NONE, "a plan of before the restart was started");
             }
@@ -160,7 +166,8 @@ impl<'a> Lab<'a> {
                 self.starts += 1;
                 let initial = format!("--initial={}", at.join(","));
                 let name = format!("mock-{}", self.starts);
-                self.system.mock = start_mock(self.stage, &name, [initial])?;
+                let options = PATIENT_MOCK.map(String::from).into_iter().chain([initial]);
+                self.system.mock = start_mock(self.stage, &name, options)?;
                 self.reset()?;
             }
         }
@@ -169,24 +176,35 @@ impl<'a> Lab<'a> {
 
     /// Brings the arm back to its home.
     fn home(&mut self) -> anyhow::Result<()> {
-        let mut planner = self.publish(&["--home"])?;
-        match planner.wait(PATIENCE)? {
-            Some(status) if status.success() => Ok(()),
-            status => bail!("going home: {status:?}: {}{}", planner.stdout(), planner.stderr()),
+        for _ in 0..TRIES {
+            let mut planner = self.publish(&["--home"])?;
+            match planner.wait(PATIENCE)? {
+                Some(status) if status.success() => return Ok(()),
+                Some(_) if planner.stdout().contains(EventKind::Aborted.text()) => {
+                    self.stalls += 1;
+                    self.reset()?;
+                }
+                status => {
+                    bail!("going home: {status:?}: {}{}", planner.stdout(), planner.stderr())
+                }
+            }
         }
+        bail!("the way home was broken off {TRIES} times")
     }
 
-    /// Resets a latched fault, again until its cause is gone.
+    /// Waits until the arm is held, and resets a latched fault until its cause is gone.
     fn reset(&mut self) -> anyhow::Result<()> {
         for _ in 0..200 {
-            self.system.witness.command(CommandKind::Reset, 0.0)?;
-            thread::sleep(Duration::from_millis(20));
             let telemetry = self.system.witness.see("telemetry", |_| true)?;
             if telemetry.mode == Mode::Hold.wire() {
                 return Ok(());
             }
+            if telemetry.mode == Mode::Fault.wire() {
+                self.system.witness.command(CommandKind::Reset, 0.0)?;
+            }
+            thread::sleep(Duration::from_millis(20));
         }
-        bail!("a reset does not help")
+        bail!("the arm does not come to hold")
     }
 
     fn running(&mut self) -> anyhow::Result<PlanId> {

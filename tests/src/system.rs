@@ -13,6 +13,11 @@ use serde::de::DeserializeOwned;
 use crate::stage::{Part, Process, Stage};
 use crate::witness::{PATIENCE, Witness};
 
+/// For an executor on a desktop, which stalls a process now and then for longer than a robot would.
+pub const PATIENT: [&str; 4] = ["--stale-ms", "100", "--lost-ms", "400"];
+/// For a mock there.
+pub const PATIENT_MOCK: [&str; 2] = ["--timeout", "100"];
+
 /// Where the mock writes its verdict, a file of the stage.
 const VERDICT: &str = "mock.json";
 

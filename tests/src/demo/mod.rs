@@ -20,7 +20,7 @@ use crate::latency::{Percentiles, of_buckets};
 use crate::measured::Swept;
 use crate::parts;
 use crate::stage::{Part, Process, Stage};
-use crate::system::System;
+use crate::system::{PATIENT, PATIENT_MOCK, System};
 use crate::witness::{Witness, WitnessError};
 
 /// How long a plan may take to make.
@@ -30,9 +30,6 @@ const SWAP_AT: f64 = 0.35;
 /// How much less than planned the measured coverage may be: the arm follows with an error of a
 /// few millimetres.
 const COVERAGE_SLACK: f64 = 0.02;
-
-/// A desktop without real-time rights stalls a process now and then for longer than a robot would.
-const PATIENT: [&str; 4] = ["--stale-ms", "100", "--lost-ms", "400"];
 
 /// Plans a chair's seat, sweeps it with a mock PR2, and swaps in a second plan mid-motion.
 ///
@@ -357,7 +354,7 @@ fn knot_time(plan: &Plan, knot: usize) -> f64 {
 fn mock_options(args: &Args, stage: &Stage, plan: &Path) -> Vec<OsString> {
     let mut options: Vec<OsString> = vec!["--plan".into(), plan.into()];
     options.extend(["--record".into(), stage.file("record.csv").into()]);
-    options.extend(["--timeout".into(), "100".into()]);
+    options.extend(PATIENT_MOCK.map(Into::into));
     let fidelity = args.fidelity.to_possible_value();
     options.extend(fidelity.map(|f| format!("--fidelity={}", f.get_name()).into()));
     options
