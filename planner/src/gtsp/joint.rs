@@ -41,7 +41,8 @@ impl<'a> Joint<'a> {
         }
         let width = self.out.len();
         // Rows that cannot get below the limit are left out.
-        let allowed = (limit - self.add - i64::from(self.least_out)).min(i64::from(i32::MAX)) as i32;
+        let allowed =
+            (limit - self.add - i64::from(self.least_out)).min(i64::from(i32::MAX)) as i32;
         let mut best = i32::MAX;
         let mut start = 0;
         while start < width {

@@ -40,6 +40,7 @@ mod solve;
 mod table;
 #[cfg(test)]
 mod tests;
+mod thin;
 mod tour;
 mod transform;
 pub mod tsplib;

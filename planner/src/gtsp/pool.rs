@@ -20,22 +20,34 @@ const CHILDREN: usize = 30;
 /// Generations without an improvement that end an epoch.
 const IDLE_GENERATIONS: u32 = 3;
 
+/// How large an epoch may be.
+#[derive(Clone, Copy)]
+pub(super) struct Epoch {
+    /// From 0 on.
+    pub(super) number: u32,
+    /// Most trials.
+    pub(super) limit: u64,
+    /// How many the time may suffice for.
+    pub(super) likely: u64,
+}
+
 /// One epoch: a fresh pool, crossed until nothing improves; then its best tour is crossed with
 /// those of the earlier epochs, whose list it joins.
 pub(super) fn evolve(
     table: &Table,
-    epoch: u32,
-    limit: u64,
+    epoch: Epoch,
     elite: &mut Vec<Order>,
     streams: &mut Streams,
     stop: &(dyn Fn() -> bool + Sync),
     record: &mut Record<'_, '_>,
 ) {
-    let size = (FIRST_POOL as u64) << epoch.min(3);
+    let Epoch { number, limit, likely } = epoch;
+    let size = (FIRST_POOL as u64) << number.min(3);
     // Small budgets get small pools: half of the trials are left for the crossing.
-    let size = size.min(limit / 64).max(1) as usize;
+    let sure = limit.min(likely);
+    let size = size.min(sure / 64).max(1) as usize;
     let size = if table.m < SMALL { 1 } else { size };
-    let trials = (TRIALS_PER_CLUSTER * table.m as u64).min(limit / (2 * size as u64));
+    let trials = (TRIALS_PER_CLUSTER * table.m as u64).min(sure / (2 * size as u64));
     let tasks: Vec<_> = (0..size).map(|k| (k, streams.next())).collect();
     let fresh: Vec<(Order, u64)> = tasks
         .into_par_iter()
@@ -53,7 +65,7 @@ pub(super) fn evolve(
         .collect();
     record.made += fresh.iter().map(|(_, made)| made).sum::<u64>();
     let mut pool: Vec<Order> = fresh.into_iter().map(|(tour, _)| tour).collect();
-    record.offer(&pool[best_of(&pool)]);
+    record.offer(table.tour(&pool[best_of(&pool)]));
     let end = record.made.saturating_add(limit.saturating_sub(trials * size as u64));
     cross_until_idle(table, &mut pool, end, streams, stop, record);
     let winner = best_of(&pool);
@@ -100,7 +112,7 @@ fn cross_until_idle(
                 idle = 0;
             }
         }
-        record.offer(&pool[best_of(pool)]);
+        record.offer(table.tour(&pool[best_of(pool)]));
     }
 }
 

@@ -10,10 +10,12 @@ use rand_chacha::ChaCha8Rng;
 use super::bound::lower_bound;
 use super::exact;
 use super::instance::Instance;
+use super::local::LocalSearch;
 use super::order::Order;
-use super::pool::evolve;
-use super::search::SMALL;
+use super::pool::{Epoch, evolve};
+use super::search::{Cooling, SMALL, construct, iterate, settle};
 use super::table::Table;
+use super::thin::{Thinned, polish};
 use super::tour::{Tour, TourCost};
 
 /// Limits on the work.
@@ -160,7 +162,8 @@ pub(super) fn rounds(
     control: Control<'_>,
     started: Instant,
 ) -> Solution {
-    let table = Table::new(instance);
+    let full = Table::new(instance);
+    let mut thinned = Thinned::new(&full);
     let stopped = AtomicBool::new(false);
     let cancel = control.cancel;
     let stop = || {
@@ -170,7 +173,6 @@ pub(super) fn rounds(
     };
     let mut record = Record {
         instance,
-        table: &table,
         best: None,
         made: 0,
         target: budget.target,
@@ -180,12 +182,33 @@ pub(super) fn rounds(
     };
     let mut streams = Streams { seed, next: 0 };
     let limit = budget.trials.unwrap_or(u64::MAX);
-    let mut elite = Vec::new();
-    for epoch in 0.. {
+    let mut elite: Vec<Order> = Vec::new();
+    for number in 0.. {
         let left = limit.saturating_sub(record.made);
-        evolve(&table, epoch, left, &mut elite, &mut streams, &stop, &mut record);
+        let epoch = |table: &Table| {
+            let likely = budget.time.map_or(u64::MAX, |time| {
+                let rate = trials_a_second(table, seed) * rayon::current_num_threads() as f64;
+                (rate * time.saturating_sub(started.elapsed()).as_secs_f64()) as u64
+            });
+            Epoch { number, limit: left, likely }
+        };
+        // Every other epoch has all nodes.
+        if let Some(thinned) = thinned.as_mut().filter(|_| number % 2 == 0) {
+            elite.iter().for_each(|tour| thinned.take_up(tour));
+            let table = thinned.table(&full);
+            let mut inside: Vec<Order> =
+                elite.iter().map(|tour| thinned.inside(&table, tour)).collect();
+            evolve(&table, epoch(&table), &mut inside, &mut streams, &stop, &mut record);
+            if !stopped.load(Ordering::Relaxed) {
+                elite.extend(inside.last().map(|winner| polish(&full, &table.tour(winner))));
+                let best = record.best.as_ref().map(|(tour, _)| polish(&full, tour));
+                best.iter().for_each(|best| record.offer(full.tour(best)));
+            }
+        } else {
+            evolve(&full, epoch(&full), &mut elite, &mut streams, &stop, &mut record);
+        }
         // So few clusters are enumerated: one epoch has the optimum.
-        if record.made >= limit || stop() || table.m < SMALL {
+        if record.made >= limit || stop() || full.m < SMALL {
             break;
         }
     }
@@ -193,6 +216,19 @@ pub(super) fn rounds(
     let (tour, cost) = record.best.expect("every epoch records a tour");
     let lower_bound = lower_bound(instance);
     Solution { tour, cost, trials: made, elapsed: started.elapsed(), lower_bound }
+}
+
+/// How fast one thread is, by a few trials on a fresh tour.
+fn trials_a_second(table: &Table, seed: u64) -> f64 {
+    const TRIALS: u64 = 64;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut local = LocalSearch::new(table.m);
+    let mut tour = construct(table, &mut rng);
+    settle(table, &mut local, &mut tour);
+    let cooling = Cooling { trials: TRIALS, from: 0.3, to: 0.03 };
+    let started = Instant::now();
+    iterate(table, &mut local, &mut tour, cooling, &mut rng, &|| false);
+    TRIALS as f64 / started.elapsed().as_secs_f64().max(1e-9)
 }
 
 /// Random streams of one seed, handed out in a fixed order before the threads start.
@@ -214,7 +250,6 @@ impl Streams {
 /// Keeps the best tour by its true cost and tells the observer.
 pub(super) struct Record<'a, 'b> {
     instance: &'a Instance,
-    table: &'a Table,
     best: Option<(Tour, TourCost)>,
     /// Trials made so far.
     pub(super) made: u64,
@@ -226,8 +261,7 @@ pub(super) struct Record<'a, 'b> {
 
 impl Record<'_, '_> {
     /// Considers a tour of the search.
-    pub(super) fn offer(&mut self, order: &Order) {
-        let tour = self.table.tour(&order.order, &order.chosen);
+    pub(super) fn offer(&mut self, tour: Tour) {
         let cost = tour.cost(self.instance);
         if self.best.as_ref().is_some_and(|(_, best)| !cost.better_than(best)) {
             return;

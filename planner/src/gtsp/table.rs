@@ -6,6 +6,7 @@
 //! is always taken from the instance.
 
 use super::instance::{Ends, Instance, Jump};
+use super::order::Order;
 use super::tour::Tour;
 
 /// Jump price in the search, in units of the largest arc worth having.
@@ -40,6 +41,10 @@ pub(super) struct Table {
     near_start: Vec<(u32, u32)>,
     /// The root is the fixed start outside the clusters.
     outer_root: bool,
+    /// No arc leads to the root but the closing one, which is free.
+    open: bool,
+    /// The instance's nodes that this table's stand for, where it has not all of them.
+    names: Option<Vec<Vec<u32>>>,
 }
 
 /// Costs of at most this much count as zero.
@@ -266,17 +271,6 @@ impl Table {
             };
         }
         data.extend_from_slice(&[0; LANES]);
-        let mut row_lowest = vec![0; widest];
-        let mut row_starts = vec![0; m * m];
-        for (a, b) in raw.pairs() {
-            let at = pairs[a * m + b].at as usize;
-            if at != 0 {
-                let (x, y) = (sizes[a] as usize, sizes[b] as usize);
-                row_starts[a * m + b] = row_lowest.len() as u32;
-                let rows = data[at..at + x * y].chunks_exact(y);
-                row_lowest.extend(rows.map(|row| row.iter().copied().min().unwrap_or(0)));
-            }
-        }
         let mut table = Self {
             m,
             root,
@@ -287,21 +281,115 @@ impl Table {
             transposed,
             data,
             lowest,
-            row_lowest,
-            row_starts,
+            row_lowest: Vec::new(),
+            row_starts: Vec::new(),
             near_out: Vec::new(),
             near_in: Vec::new(),
             near_cost: Vec::new(),
             near_in_cost: Vec::new(),
             near_start: Vec::new(),
             outer_root: root >= clusters,
+            open: *instance.ends() != Ends::Closed,
+            names: None,
         };
-        table.find_candidates(*instance.ends() != Ends::Closed);
+        table.find_row_lowest();
+        table.find_candidates();
         table
     }
 
-    fn find_candidates(&mut self, open: bool) {
+    /// The same costs between fewer nodes: `nodes` of each cluster, ascending.
+    pub(super) fn restricted(&self, nodes: &[Vec<u32>]) -> Self {
         let m = self.m;
+        let sizes: Vec<u32> = nodes.iter().map(|n| n.len() as u32).collect();
+        let widest = sizes.iter().copied().max().unwrap_or(1) as usize;
+        let mut data = vec![0; widest * widest];
+        let mut pairs = self.pairs.clone();
+        let mut transposed = self.transposed.clone();
+        let mut lowest = self.lowest.clone();
+        for a in 0..m {
+            for b in 0..m {
+                let k = a * m + b;
+                if self.pairs[k].at == 0 {
+                    continue;
+                }
+                pairs[k].at = data.len() as u32;
+                for &i in &nodes[a] {
+                    let (_, row) = self.row(a as u32, i, b as u32);
+                    data.extend(nodes[b].iter().map(|&j| row[j as usize]));
+                }
+                lowest[k] = data[pairs[k].at as usize..].iter().copied().min().unwrap_or(0);
+            }
+        }
+        for a in 0..m {
+            for b in 0..m {
+                let k = a * m + b;
+                if self.pairs[k].at == 0 {
+                    continue;
+                }
+                if self.transposed[k] == self.pairs[b * m + a].at {
+                    transposed[k] = pairs[b * m + a].at;
+                } else {
+                    transposed[k] = data.len() as u32;
+                    for &j in &nodes[b] {
+                        let (_, column) = self.column(a as u32, b as u32, j);
+                        data.extend(nodes[a].iter().map(|&i| column[i as usize]));
+                    }
+                }
+            }
+        }
+        data.extend_from_slice(&[0; LANES]);
+        let mut table = Self {
+            m,
+            root: self.root,
+            sizes,
+            reversible: self.reversible,
+            typical: self.typical,
+            pairs,
+            transposed,
+            data,
+            lowest,
+            row_lowest: Vec::new(),
+            row_starts: Vec::new(),
+            near_out: Vec::new(),
+            near_in: Vec::new(),
+            near_cost: Vec::new(),
+            near_in_cost: Vec::new(),
+            near_start: Vec::new(),
+            outer_root: self.outer_root,
+            open: self.open,
+            names: Some(nodes.to_vec()),
+        };
+        table.find_row_lowest();
+        table.find_candidates();
+        table
+    }
+
+    /// Whether arcs from `a` to `b` are known one by one.
+    pub(super) fn is_stored(&self, a: u32, b: u32) -> bool {
+        self.pairs[a as usize * self.m + b as usize].at != 0
+    }
+
+    fn find_row_lowest(&mut self) {
+        let m = self.m;
+        let widest = self.sizes.iter().copied().max().unwrap_or(1) as usize;
+        // Pairs that are not stored share a block of zeros.
+        self.row_lowest = vec![0; widest];
+        self.row_starts = vec![0; m * m];
+        for a in 0..m {
+            for b in 0..m {
+                let at = self.pairs[a * m + b].at as usize;
+                if at != 0 {
+                    let (x, y) = (self.sizes[a] as usize, self.sizes[b] as usize);
+                    self.row_starts[a * m + b] = self.row_lowest.len() as u32;
+                    let rows = self.data[at..at + x * y].chunks_exact(y);
+                    self.row_lowest.extend(rows.map(|row| row.iter().copied().min().unwrap_or(0)));
+                }
+            }
+        }
+    }
+
+    fn find_candidates(&mut self) {
+        let (m, open) = (self.m, self.open);
         let mut typical = 0.0;
         let mut counted = 0;
         for a in 0..m {
@@ -389,6 +477,18 @@ impl Table {
         &self.row_lowest[at..at + self.sizes[a as usize] as usize]
     }
 
+    /// For each node of `b` the cheapest entry of its column in [`Self::block`].
+    pub(super) fn column_lowest(&self, a: u32, b: u32) -> Vec<i32> {
+        let (_, block) = self.block(a, b);
+        let mut lowest = vec![i32::MAX; self.sizes[b as usize] as usize];
+        for row in block.chunks_exact(lowest.len()) {
+            for (low, d) in lowest.iter_mut().zip(row) {
+                *low = (*low).min(*d);
+            }
+        }
+        lowest
+    }
+
     /// Clusters that are cheap to reach from `a`, nearest first, with the cheapest arc.
     #[inline]
     pub(super) fn near_out(&self, a: u32) -> impl Iterator<Item = (u32, i32)> + '_ {
@@ -405,13 +505,28 @@ impl Table {
         self.near_in[range.clone()].iter().copied().zip(self.near_in_cost[range].iter().copied())
     }
 
-    /// The public form of an order of clusters with the root first.
-    pub(super) fn tour(&self, order: &[u32], chosen: &[u32]) -> Tour {
-        let order = &order[usize::from(self.outer_root)..];
+    /// The public form of a tour under search.
+    pub(super) fn tour(&self, tour: &Order) -> Tour {
+        let clusters = &tour.order[usize::from(self.outer_root)..];
+        let node = |c: u32| {
+            let node = tour.chosen[c as usize];
+            self.names.as_ref().map_or(node, |names| names[c as usize][node as usize])
+        };
         Tour {
-            clusters: order.iter().map(|&c| c as usize).collect(),
-            nodes: order.iter().map(|&c| chosen[c as usize] as usize).collect(),
+            clusters: clusters.iter().map(|&c| c as usize).collect(),
+            nodes: clusters.iter().map(|&c| node(c) as usize).collect(),
         }
+    }
+
+    /// The tour under search of a public form that [`Self::tour`] gave, in a table of all nodes.
+    pub(super) fn order(&self, tour: &Tour) -> Order {
+        let root = self.outer_root.then_some(self.root as u32);
+        let order = root.into_iter().chain(tour.clusters.iter().map(|&c| c as u32)).collect();
+        let mut chosen = vec![0; self.m];
+        for (&c, &node) in tour.clusters.iter().zip(&tour.nodes) {
+            chosen[c] = node as u32;
+        }
+        Order::new(self, order, chosen)
     }
 }
 

@@ -75,6 +75,21 @@ pub(super) fn random_instance(
     Instance::new(&sizes, Costs::Blocks(blocks), jump, ends).expect("the parts fit")
 }
 
+/// Clusters of 25 to 60 points of the plane, about as far apart as they are wide.
+fn scattered(clusters: usize, spread: f64, seed: u64) -> Instance {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let sizes: Vec<usize> = (0..clusters).map(|_| rng.random_range(25..60)).collect();
+    let mut points = Vec::new();
+    for &size in &sizes {
+        let centre = [0; 2].map(|_| rng.random_range(0.0..500.0));
+        points.extend((0..size).map(|_| centre.map(|c| c + spread * rng.random_range(-1.0..1.0))));
+    }
+    let between = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+    let costs = points.iter().flat_map(|&p| points.iter().map(move |&q| between(p, q))).collect();
+    Instance::new(&sizes, Costs::Dense(costs), Jump::Forbidden, Ends::Closed)
+        .expect("the parts fit")
+}
+
 fn search(instance: &Instance, trials: u64, threads: usize) -> Solution {
     let budget = Budget { threads, ..Budget::trials(trials) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
@@ -114,6 +129,24 @@ proptest! {
         prop_assert_eq!(one.tour.cost(&instance), one.cost);
         let two = search(&instance, 500, 2);
         prop_assert_eq!((one.tour, one.cost, one.trials), (two.tour, two.cost, two.trials));
+    }
+}
+
+proptest! {
+    // The oracle is slow on wide clusters.
+    #![proptest_config(ProptestConfig { cases: 8, ..ProptestConfig::default() })]
+
+    #[test]
+    fn wide_clusters_lose_nothing_by_being_thinned(spread in 0.0..200.0, seed: u64) {
+        let instance = scattered(9, spread, seed);
+        let (_, cost) = solve_exact(&instance).expect("small enough");
+        let found = search(&instance, 3000, 1);
+        found.tour.check(&instance).expect("valid");
+        prop_assert_eq!(found.tour.cost(&instance), found.cost);
+        let (least, reached) = (cost.total(), found.cost.total());
+        prop_assert!((reached - least).abs() <= 1e-6 * least, "{} instead of {}", reached, least);
+        let two = search(&instance, 3000, 2);
+        prop_assert_eq!((found.tour, found.cost, found.trials), (two.tour, two.cost, two.trials));
     }
 }
 
