@@ -7,6 +7,7 @@ mod picture;
 mod plan;
 mod publish;
 mod replan;
+mod robot;
 
 pub use picture::{joint_axes, motion};
 

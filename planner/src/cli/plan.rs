@@ -7,10 +7,11 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use nullsweep_robot::{ArmSpec, JointVector, MAX_DOF, Robot, Side};
+use nullsweep_robot::{JointVector, MAX_DOF};
 
 use super::bars::Bars;
 use super::picture::picture;
+use super::robot::RobotArgs;
 use super::{OK, VIOLATIONS, write_json};
 use crate::collision::{Obstacle, ObstacleShape};
 use crate::cost::CostKind;
@@ -56,15 +57,8 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
     crop: Option<CropBox>,
 
-    /// The robot's URDF; without it the PR2.
-    #[arg(long, value_name = "FILE")]
-    urdf: Option<PathBuf>,
-    /// Which arm of the PR2.
-    #[arg(long, value_enum, default_value = "right")]
-    arm: ArmSide,
-    /// Base and tip link of another robot's arm: BASE,TIP.
-    #[arg(long, value_name = "BASE,TIP", requires = "urdf")]
-    chain: Option<String>,
+    #[command(flatten)]
+    robot: RobotArgs,
     /// The tool, a TOML file; without it a sponge of 0.10 × 0.07 m.
     #[arg(long, value_name = "FILE")]
     tool: Option<PathBuf>,
@@ -147,12 +141,6 @@ enum Demo {
     BobbyCar,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum ArmSide {
-    Left,
-    Right,
-}
-
 /// N comma-separated finite numbers.
 #[derive(Clone, Copy, Debug)]
 struct Numbers<const N: usize>([f64; N]);
@@ -231,10 +219,7 @@ pub(super) fn run(args: &PlanArgs) -> anyhow::Result<u8> {
 /// Makes a plan, writes what was asked for, and gives the exit code with it.
 pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8, Plan)> {
     let bars = Bars::new();
-    let robot = match &args.urdf {
-        Some(path) => Robot::from_urdf_file(path)?,
-        None => Robot::pr2(),
-    };
+    let robot = args.robot.robot()?;
     bars.stage("scan", None);
     let scene = scene(args, &bars)?;
     let job = job(args, &scene, after)?;
@@ -467,7 +452,7 @@ fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<J
     let mut start: JointVector = [0.0; MAX_DOF];
     start[..args.start.len()].copy_from_slice(&args.start);
     Ok(Job {
-        arm: spec(args)?,
+        arm: args.robot.spec()?,
         tool,
         stance,
         surroundings: scene.surroundings.clone(),
@@ -487,7 +472,7 @@ fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<J
         },
         formulation: FormulationConfig { beta: args.beta, trials_per_cluster: args.trials },
         refinements: args.refinements,
-        collision: crate::collision::Options::default(),
+        collision: args.robot.collision(),
         seed: args.seed,
     })
 }
@@ -495,18 +480,4 @@ fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<J
 fn held(args: &PlanArgs) -> Vec<(String, f64)> {
     let torso = args.torso.map(|height| ("torso_lift_joint".to_owned(), height));
     torso.into_iter().chain(args.held.iter().map(|h| (h.0.clone(), h.1))).collect()
-}
-
-fn spec(args: &PlanArgs) -> anyhow::Result<ArmSpec> {
-    match (&args.chain, &args.urdf) {
-        (Some(chain), _) => {
-            let (base, tip) = chain.split_once(',').context("--chain: BASE,TIP is wanted")?;
-            Ok(ArmSpec { base: base.into(), tip: tip.into() })
-        }
-        (None, Some(_)) if args.arm == ArmSide::Left => Ok(ArmSpec::pr2(Side::Left)),
-        (None, _) => Ok(ArmSpec::pr2(match args.arm {
-            ArmSide::Left => Side::Left,
-            ArmSide::Right => Side::Right,
-        })),
-    }
 }

@@ -268,6 +268,9 @@ pub fn run(
     progress.stage("stance", None);
     let setting = clock.time("stance", || settle(robot, &free_arm, scan, &patches, job))?;
     let Setting { stance, arm, scan, patches, world } = setting;
+    for note in world.notes() {
+        progress.note(note);
+    }
     let mut start = start(job, &arm, &world)?;
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
 
