@@ -34,6 +34,7 @@ pub mod verify;
 
 pub mod pipeline;
 pub mod progress;
+pub mod task;
 
 pub mod cli;
 pub mod export;

@@ -8,6 +8,7 @@ mod plan;
 mod publish;
 mod replan;
 mod robot;
+mod task;
 
 pub use picture::{joint_axes, motion};
 
@@ -41,6 +42,8 @@ struct Cli {
 enum Command {
     /// Make a plan from scans, or from a simulated scan.
     Plan(Box<plan::PlanArgs>),
+    /// Make a plan through given tool poses.
+    Task(Box<task::TaskArgs>),
     /// Send a plan to the executor.
     Publish(publish::PublishArgs),
     /// Replace the plan that runs by one for what it has not swept yet, without a stop.
@@ -64,6 +67,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let result = match cli.command {
         Command::Plan(args) => plan::run(&args),
+        Command::Task(args) => task::run(&args),
         Command::Publish(args) => publish::run(&args),
         Command::Replan(args) => replan::run(&args),
         Command::Gtsp(args) => crate::gtsp::cli::run(&args, &mut std::io::stdout().lock())

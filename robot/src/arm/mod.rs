@@ -211,6 +211,12 @@ impl Arm {
         self.chain.jacobian(q).1
     }
 
+    /// Pose of the tip and [`Self::jacobian`], for little more than the Jacobian alone costs.
+    #[must_use]
+    pub fn tip_pose_and_jacobian(&self, q: &JointVector) -> (Isometry3<f64>, Jacobian) {
+        self.chain.jacobian(q)
+    }
+
     /// The soft limits of a joint moved in by |velocity| / k_position: where the arm may be at
     /// that speed. The one rule of planner and executor; see [`JointLimits::braking`].
     #[must_use]

@@ -1,0 +1,146 @@
+//! A route through all poses: its cost, its relaxation, small changes of its order.
+
+use nalgebra::Isometry3;
+use nullsweep_robot::JointVector;
+
+use super::space::{Point, Space, distance};
+
+/// Poses in the order in which they are visited, and the joint vector at each.
+#[derive(Clone, Debug)]
+pub(super) struct Route {
+    /// Indices of poses.
+    pub(super) order: Vec<usize>,
+    /// For each pose, by its index.
+    pub(super) points: Vec<Point>,
+}
+
+/// What an edge that changes the posture costs besides its length: more than any detour. \[rad\]
+pub(super) const PENALTY: f64 = 20.0;
+/// A relaxed joint vector that gains less than this stays. \[rad\]
+const GAIN: f64 = 1e-7;
+/// Neighbours in the pose's list beside which it is tried.
+const BESIDE: usize = 10;
+
+/// Poses, their neighbours and the space that they are met in.
+pub(super) struct Task<'a> {
+    pub(super) space: Space<'a>,
+    pub(super) poses: &'a [Isometry3<f64>],
+    /// For each pose the others, nearest first, as many as are looked at.
+    pub(super) near: Vec<Vec<usize>>,
+}
+
+impl Task<'_> {
+    /// Length of an edge with its penalty. \[rad\]
+    pub(super) fn edge(&self, a: &Point, b: &Point) -> f64 {
+        let length = distance(&a.q, &b.q);
+        if self.space.is_reconfiguration(a, b) { length + PENALTY } else { length }
+    }
+
+    /// Sum over all edges. \[rad\]
+    pub(super) fn cost(&self, route: &Route) -> f64 {
+        route.order.windows(2).map(|w| self.edge(&route.points[w[0]], &route.points[w[1]])).sum()
+    }
+
+    /// Moves every joint vector to where it makes the way shorter, one after the other, again and
+    /// again; at most `sweeps` times.
+    pub(super) fn relax(&self, route: &mut Route, sweeps: usize) {
+        for sweep in 0..sweeps {
+            let mut gained = 0.0;
+            let count = route.order.len();
+            for step in 0..count {
+                // Forwards and backwards in turn, so that changes travel both ways.
+                let at = if sweep % 2 == 0 { step } else { count - 1 - step };
+                gained += self.relax_at(route, at);
+            }
+            if gained < 1e-5 * count as f64 {
+                return;
+            }
+        }
+    }
+
+    /// Moves the joint vector at one place of the order; returns what is gained. \[rad\]
+    fn relax_at(&self, route: &mut Route, at: usize) -> f64 {
+        let pose = route.order[at];
+        let before = at.checked_sub(1).map(|k| route.points[route.order[k]]);
+        let after = route.order.get(at + 1).map(|&k| route.points[k]);
+        let here = route.points[pose];
+        let local = |point: &Point| {
+            let to = |other: &Option<Point>| other.map_or(0.0, |o| self.edge(&o, point));
+            to(&before) + to(&after)
+        };
+        let old = local(&here);
+        let target: JointVector = match (&before, &after) {
+            (Some(a), Some(b)) => {
+                // The way is shortest where both neighbours pull with the same force; Weiszfeld's
+                // step goes there, and the projection back onto what meets the pose.
+                let pull = |o: &Point| 1.0 / (distance(&o.q, &here.q) + 1e-3);
+                let (u, v) = (pull(a), pull(b));
+                std::array::from_fn(|j| (u * a.q[j] + v * b.q[j]) / (u + v))
+            }
+            (Some(one), None) | (None, Some(one)) => one.q,
+            (None, None) => return 0.0,
+        };
+        // The whole step, or less where it overshoots.
+        for share in [1.0, 0.4, 0.1] {
+            let q = std::array::from_fn(|j| here.q[j] + share * (target[j] - here.q[j]));
+            let Some(point) = self.space.project(&self.poses[pose], &q) else { continue };
+            let gain = old - local(&point);
+            if gain > GAIN && self.space.is_free(&point) {
+                route.points[pose] = point;
+                return gain;
+            }
+        }
+        0.0
+    }
+
+    /// Takes single poses out and puts them where they cost least, their joint vectors moved to
+    /// suit the new place; returns what is gained. \[rad\]
+    pub(super) fn reinsert(&self, route: &mut Route) -> f64 {
+        let mut gained = 0.0;
+        for pose in 0..self.poses.len() {
+            let Some(at) = route.order.iter().position(|&p| p == pose) else { continue };
+            let point =
+                |k: Option<usize>| k.and_then(|k| route.order.get(k)).map(|&p| route.points[p]);
+            let (before, after) = (point(at.checked_sub(1)), point(Some(at + 1)));
+            let here = route.points[pose];
+            let to = |a: &Option<Point>, b: &Option<Point>| match (a, b) {
+                (Some(a), Some(b)) => self.edge(a, b),
+                _ => 0.0,
+            };
+            let saved = to(&before, &Some(here)) + to(&Some(here), &after) - to(&before, &after);
+            if saved < 1e-3 {
+                continue;
+            }
+            let mut rest = route.order.clone();
+            rest.remove(at);
+            let mut best: Option<(f64, usize, Point)> = None;
+            for &other in self.near[pose].iter().take(BESIDE) {
+                let Some(beside) = rest.iter().position(|&p| p == other) else { continue };
+                for place in [beside, beside + 1] {
+                    let point =
+                        |k: Option<usize>| k.and_then(|k| rest.get(k)).map(|&p| route.points[p]);
+                    let (a, b) = (point(place.checked_sub(1)), point(Some(place)));
+                    let start = match (&a, &b) {
+                        (Some(a), Some(b)) => std::array::from_fn(|j| 0.5 * (a.q[j] + b.q[j])),
+                        (Some(one), None) | (None, Some(one)) => one.q,
+                        (None, None) => continue,
+                    };
+                    let Some(new) = self.space.project(&self.poses[pose], &start) else { continue };
+                    let cost = to(&a, &Some(new)) + to(&Some(new), &b) - to(&a, &b);
+                    if cost < best.as_ref().map_or(saved - 1e-6, |b| b.0)
+                        && self.space.is_free(&new)
+                    {
+                        best = Some((cost, place, new));
+                    }
+                }
+            }
+            if let Some((cost, place, new)) = best {
+                rest.insert(place, pose);
+                route.order = rest;
+                route.points[pose] = new;
+                gained += saved - cost;
+            }
+        }
+        gained
+    }
+}
