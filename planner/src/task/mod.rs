@@ -24,7 +24,7 @@ use crate::plan::{FORMAT, Held, Plan, PlanKnot, SurfaceSample};
 use crate::progress::Progress;
 use crate::scan::Scan;
 use crate::surface::Surface;
-use crate::timing;
+use crate::timing::{self, Profile};
 use crate::tool::Tool;
 use crate::transfer;
 use crate::verify::{self, Verification};
@@ -169,7 +169,10 @@ pub fn run(
     let arm = robot.arm(&config.arm)?.with_held(&held)?;
     let world = World::new(robot, &arm, &config.tool, &[], &config.obstacles, &config.collision)?;
     let space = Space::new(&arm, &world, &config.tool, &config.tolerance);
-    let (route, _) = search::search(space, poses, config, progress)?;
+    let (route, unmet) = search::search(space, poses, config, progress)?;
+    for pose in unmet {
+        progress.note(&format!("pose {pose} is left out: no joint vector meets it"));
+    }
     let edges = edges(&space, &route, config.seed)?;
     let plan = assemble(robot, &arm, poses, &route, &edges, config);
     let calc_time_s = started.elapsed().as_secs_f64();
@@ -247,18 +250,17 @@ fn assemble(
     edges: &[Option<Vec<JointVector>>],
     config: &TaskConfig,
 ) -> Plan {
+    let knot = |q, line, patch| PlanKnot { time_ns: 0, q, v: JointVector::default(), line, patch };
     let mut knots: Vec<PlanKnot> = Vec::new();
     for (k, &pose) in route.order.iter().enumerate() {
         let point = &route.points[pose];
         let through = k.checked_sub(1).and_then(|e| edges[e].as_ref());
         if let Some([_, between @ .., _]) = through.map(Vec::as_slice) {
-            let on_the_way =
-                |q: &JointVector| PlanKnot { time_ns: 0, q: *q, line: None, patch: None };
-            knots.extend(between.iter().map(on_the_way));
+            knots.extend(between.iter().map(|q| knot(*q, None, None)));
         }
         let at = point.tool.translation.vector;
         let line = Some([at.x, at.y, at.z]);
-        knots.push(PlanKnot { time_ns: 0, q: point.q, line, patch: Some(pose as u32) });
+        knots.push(knot(point.q, line, Some(pose as u32)));
     }
     let velocity = cost::velocities(arm, config.v_max);
     let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
@@ -280,6 +282,7 @@ fn assemble(
         base: [0.0; 3],
         method: Method::Tsp,
         cost: CostKind::Effort,
+        profile: Profile::Velocity,
         seed: config.seed,
         knots,
         patches: poses.iter().map(|p| p.translation.vector.into()).collect(),

@@ -8,6 +8,8 @@
 //! 3. The route is relaxed over the tolerance, poses are moved to better places, and what each
 //!    pose would be if it was visited from its neighbours' joint vectors enters the next round.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Isometry3, Vector3};
 use nullsweep_robot::JointVector;
 use rand::{RngExt, SeedableRng};
@@ -109,7 +111,7 @@ fn neighbours(poses: &[Isometry3<f64>]) -> Vec<Vec<usize>> {
     let axes: Vec<Vector3<f64>> = poses.iter().map(|p| p.rotation * Vector3::z()).collect();
     let apart = |a: usize, b: usize| {
         let shift = poses[a].translation.vector - poses[b].translation.vector;
-        shift.norm() + AXIS_WEIGHT / std::f64::consts::PI * axes[a].angle(&axes[b])
+        shift.norm() + AXIS_WEIGHT / PI * axes[a].angle(&axes[b])
     };
     (0..poses.len())
         .into_par_iter()
@@ -132,10 +134,10 @@ fn roots(task: &Task<'_>, seed: u64) -> Vec<(usize, Point)> {
             let mut q = JointVector::default();
             for (q, &(low, high)) in q.iter_mut().zip(arm.margined_limits()) {
                 let bounded = low.is_finite() && high.is_finite();
-                let (low, high) = if bounded { (low, high) } else { (-3.14, 3.14) };
+                let (low, high) = if bounded { (low, high) } else { (-PI, PI) };
                 // Half a turn either way from the middle holds every posture.
                 let middle = 0.5 * (low + high);
-                *q = rng.random_range(low.max(middle - 3.2)..=high.min(middle + 3.2));
+                *q = rng.random_range(low.max(middle - PI)..=high.min(middle + PI));
             }
             q
         })
