@@ -73,7 +73,7 @@ impl<'a> Space<'a> {
             if excess.amax() < RESIDUAL {
                 return Some(Point { q, tool });
             }
-            self.to_pose_axes(pose, &tip, &tool, &mut jacobian);
+            self.turn_to_pose(pose, &tip, &tool, &mut jacobian);
             self.step(&excess, jacobian, &mut q)?;
         }
         None
@@ -90,7 +90,7 @@ impl<'a> Space<'a> {
     }
 
     /// Turns the tip's Jacobian into that of the tool's deviation, near enough for small tilts.
-    fn to_pose_axes(
+    fn turn_to_pose(
         &self,
         pose: &Isometry3<f64>,
         tip: &Isometry3<f64>,
