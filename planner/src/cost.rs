@@ -2,6 +2,7 @@
 
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
 use serde::{Deserialize, Serialize};
+use wide::f32x8;
 
 /// The cost of a straight joint motion. Implement it for a cost of your own; every search in
 /// this crate is generic over it.
@@ -12,6 +13,16 @@ pub trait Cost: Send + Sync {
     /// The cost of moving each joint by `displacement` (absolute values, unused lanes 0).
     /// \[rad\] or \[m\] in, the cost's own unit out.
     fn of(&self, displacement: &JointVector) -> f64;
+
+    /// The same for eight motions side by side, entry `j` holding joint `j` of each, in single
+    /// precision: what the large searches ask. Without one of its own a cost is asked eight times.
+    #[inline]
+    fn of_eight(&self, displacement: &[f32x8; MAX_DOF]) -> f32x8 {
+        let lanes = displacement.map(f32x8::to_array);
+        f32x8::from(std::array::from_fn(|k| {
+            self.of(&std::array::from_fn(|j| f64::from(lanes[j][k]))) as f32
+        }))
+    }
 }
 
 /// Manipulation effort: the sum of all joint displacements (Eq. 1). \[rad\]
@@ -22,6 +33,11 @@ impl Cost for Effort {
     #[inline]
     fn of(&self, displacement: &JointVector) -> f64 {
         displacement.iter().sum()
+    }
+
+    #[inline]
+    fn of_eight(&self, displacement: &[f32x8; MAX_DOF]) -> f32x8 {
+        displacement.iter().fold(f32x8::ZERO, |sum, d| sum + *d)
     }
 }
 
@@ -50,6 +66,15 @@ impl Cost for TaskTime {
         }
         time
     }
+
+    #[inline]
+    fn of_eight(&self, displacement: &[f32x8; MAX_DOF]) -> f32x8 {
+        let mut time = f32x8::ZERO;
+        for j in 0..MAX_DOF {
+            time = time.fast_max(displacement[j] * self.seconds_per_unit[j] as f32);
+        }
+        time
+    }
 }
 
 /// A weighted sum of two costs.
@@ -60,6 +85,12 @@ impl<A: Cost, B: Cost> Cost for Weighted<A, B> {
     #[inline]
     fn of(&self, displacement: &JointVector) -> f64 {
         self.0 * self.1.of(displacement) + self.2 * self.3.of(displacement)
+    }
+
+    #[inline]
+    fn of_eight(&self, displacement: &[f32x8; MAX_DOF]) -> f32x8 {
+        self.1.of_eight(displacement) * self.0 as f32
+            + self.3.of_eight(displacement) * self.2 as f32
     }
 }
 
@@ -101,4 +132,36 @@ pub fn displacement(continuous: &[bool; MAX_DOF], a: &JointVector, b: &JointVect
 #[must_use]
 pub fn of_path<C: Cost>(cost: &C, path: &[JointVector]) -> f64 {
     path.windows(2).map(|w| cost.of(&std::array::from_fn(|j| (w[1][j] - w[0][j]).abs()))).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cost that says nothing about eight motions at once.
+    struct Squares;
+
+    impl Cost for Squares {
+        fn of(&self, displacement: &JointVector) -> f64 {
+            displacement.iter().map(|d| d * d).sum()
+        }
+    }
+
+    fn check(cost: &impl Cost) {
+        let at = |j: usize, k: usize| (1.7 * (j * 8 + k) as f64).sin().abs();
+        let lanes = std::array::from_fn(|j| f32x8::from(std::array::from_fn(|k| at(j, k) as f32)));
+        for (k, found) in cost.of_eight(&lanes).to_array().into_iter().enumerate() {
+            let expected = cost.of(&std::array::from_fn(|j| at(j, k)));
+            assert!((f64::from(found) - expected).abs() < 1e-5, "{k}: {found} {expected}");
+        }
+    }
+
+    #[test]
+    fn eight_motions_cost_what_each_of_them_does() {
+        let velocity = [2.0, 1.0, 0.5, 3.0, 2.0, 2.0, 1.5, 0.0];
+        check(&Effort);
+        check(&TaskTime::new(&velocity));
+        check(&Weighted(0.3, Effort, 2.0, TaskTime::new(&velocity)));
+        check(&Squares);
+    }
 }
