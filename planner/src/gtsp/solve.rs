@@ -108,6 +108,8 @@ pub struct Control<'a> {
     pub progress: Option<&'a mut Observer<'a>>,
     /// Set it from any thread: the search ends within milliseconds, the best tour is returned.
     pub cancel: Option<&'a AtomicBool>,
+    /// A tour of the same instance that the search goes on from; the result is never worse.
+    pub start: Option<&'a Tour>,
 }
 
 /// Best tour found within the budget; the same for the same (instance, seed, trials) whatever the
@@ -183,6 +185,10 @@ pub(super) fn rounds(
     let mut streams = Streams { seed, next: 0 };
     let limit = budget.trials.unwrap_or(u64::MAX);
     let mut elite: Vec<Order> = Vec::new();
+    if let Some(start) = control.start.filter(|start| start.check(instance).is_ok()) {
+        elite.push(full.order(start));
+        record.offer(start.clone());
+    }
     for number in 0.. {
         let left = limit.saturating_sub(record.made);
         let epoch = |table: &Table| {

@@ -518,10 +518,14 @@ impl Table {
         }
     }
 
-    /// The tour under search of a public form that [`Self::tour`] gave, in a table of all nodes.
+    /// The tour under search of a public form, in a table of all nodes.
     pub(super) fn order(&self, tour: &Tour) -> Order {
         let root = self.outer_root.then_some(self.root as u32);
-        let order = root.into_iter().chain(tour.clusters.iter().map(|&c| c as u32)).collect();
+        let mut order: Vec<u32> =
+            root.into_iter().chain(tour.clusters.iter().map(|&c| c as u32)).collect();
+        // A closed tour from outside may begin anywhere.
+        let root = order.iter().position(|&c| c as usize == self.root).unwrap_or(0);
+        order.rotate_left(root);
         let mut chosen = vec![0; self.m];
         for (&c, &node) in tour.clusters.iter().zip(&tour.nodes) {
             chosen[c] = node as u32;

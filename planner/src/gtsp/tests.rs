@@ -213,15 +213,28 @@ fn progress_improves_and_can_stop_the_search() {
             std::ops::ControlFlow::Continue(())
         }
     };
-    let control = Control { progress: Some(&mut observe), cancel: None };
+    let control = Control { progress: Some(&mut observe), ..Control::default() };
     let solution = solve_with(&instance, &Budget::trials(u64::MAX), 1, control).expect("limited");
     assert_eq!(told.len(), 2);
     assert!(told[1] < told[0]);
     assert_eq!(solution.cost.total(), told[1]);
     let cancelled = std::sync::atomic::AtomicBool::new(true);
-    let control = Control { progress: None, cancel: Some(&cancelled) };
+    let control = Control { cancel: Some(&cancelled), ..Control::default() };
     let solution = solve_with(&instance, &Budget::trials(u64::MAX), 1, control).expect("limited");
     solution.tour.check(&instance).expect("valid even so");
+}
+
+#[test]
+fn a_search_goes_on_from_a_tour() {
+    for kind in KINDS {
+        let instance = random_instance(kind, 25, 3, 1, 2);
+        let budget = |trials| Budget { threads: 1, ..Budget::trials(trials) };
+        let good = solve(&instance, &budget(20_000), 1).expect("limited");
+        let control = Control { start: Some(&good.tour), ..Control::default() };
+        let next = solve_with(&instance, &budget(1), 2, control).expect("limited");
+        next.tour.check(&instance).expect("valid");
+        assert!(!good.cost.better_than(&next.cost), "{:?} {:?}", next.cost, good.cost);
+    }
 }
 
 #[test]
