@@ -20,6 +20,9 @@ pub enum Method {
     Tsp,
     /// A node for each patch and incident edge; distance and turning are weighed (Eq. 4).
     Curvature,
+    /// A node for each patch, incident edge and sample of the inverse kinematics; the cost of the
+    /// joint motion is weighed (Eq. 1–3), see [`joint`](crate::joint).
+    Joint,
 }
 
 /// What the formulation needs besides the graph.
@@ -29,11 +32,14 @@ pub struct FormulationConfig {
     pub beta: f64,
     /// Trials of the search for each patch.
     pub trials_per_cluster: u64,
+    /// Search a closed tour and cut it at the pose nearest the tool, as the paper does, instead of
+    /// an open path from the tool on.
+    pub closed: bool,
 }
 
 impl Default for FormulationConfig {
     fn default() -> Self {
-        Self { beta: 0.9, trials_per_cluster: 100 }
+        Self { beta: 0.9, trials_per_cluster: 100, closed: false }
     }
 }
 
@@ -59,16 +65,14 @@ pub enum FormulationError {
 
 /// Price of going between patches that no edge joins (Eq. 3's h): dearer than any whole tour. \[m\]
 /// or weighed [m and rad]
-const JUMP: f64 = 1e4;
+pub(crate) const JUMP: f64 = 1e4;
 
-/// The tour over all components of the graph: an open path that starts near `tool_pose` (the
-/// contact frame in the root frame), one component after the other, always the one nearest to
-/// where the last one ended.
+/// [`Method::Tsp`]: the shortest Euclidean way, from `tool_pose` (the contact frame in the root
+/// frame) on, the headings along it.
 ///
 /// # Errors
 /// A cost that is not a number; it does not occur for finite patches.
-pub fn tour(
-    method: Method,
+pub fn shortest(
     graph: &Graph,
     patches: &[Patch],
     tool: &Tool,
@@ -76,28 +80,94 @@ pub fn tour(
     config: &FormulationConfig,
     seed: u64,
 ) -> Result<Vec<Stop>, FormulationError> {
+    over_components(graph, patches, tool, tool_pose, |component, here| {
+        Problem { graph, patches, tool, component, start: *here, config }.shortest(seed)
+    })
+}
+
+/// [`Method::Curvature`]: the way of least length and turning (Eq. 4), from `tool_pose` (the
+/// contact frame in the root frame) on.
+///
+/// # Errors
+/// A cost that is not a number; it does not occur for finite patches.
+pub fn smoothest(
+    graph: &Graph,
+    patches: &[Patch],
+    tool: &Tool,
+    tool_pose: &Isometry3<f64>,
+    config: &FormulationConfig,
+    seed: u64,
+) -> Result<Vec<Stop>, FormulationError> {
+    over_components(graph, patches, tool, tool_pose, |component, here| {
+        Problem { graph, patches, tool, component, start: *here, config }.smoothest(seed)
+    })
+}
+
+/// The tour over all components of the graph, one after the other, always the one nearest to where
+/// the last one ended, from `tool_pose` on. `visit` is told a component's patches and the contact
+/// pose before it.
+///
+/// # Errors
+/// Passes on those of `visit`.
+pub fn over_components<E>(
+    graph: &Graph,
+    patches: &[Patch],
+    tool: &Tool,
+    tool_pose: &Isometry3<f64>,
+    mut visit: impl FnMut(&[usize], &Isometry3<f64>) -> Result<Vec<Stop>, E>,
+) -> Result<Vec<Stop>, E> {
     let mut left: Vec<&Vec<usize>> = graph.components.iter().collect();
     let mut here = *tool_pose;
     let mut tour = Vec::new();
     while !left.is_empty() {
         let distance = |component: &[usize]| {
-            component
-                .iter()
-                .map(|&p| (patches[p].centre.coords - here.translation.vector).norm())
-                .fold(f64::INFINITY, f64::min)
+            apart(patches, component[nearest(patches, component, &here)], &here)
         };
-        let nearest = (0..left.len())
+        let next = (0..left.len())
             .min_by(|&a, &b| distance(left[a]).total_cmp(&distance(left[b])).then(a.cmp(&b)))
             .unwrap_or(0);
-        let component = left.remove(nearest);
-        let problem = Problem { graph, patches, tool, component, start: here, config };
-        let stops = problem.solve(method, seed)?;
+        let stops = visit(left.remove(next), &here)?;
         if let Some(last) = stops.last() {
             here = pose(patches, tool, last);
         }
         tour.extend(stops);
     }
     Ok(tour)
+}
+
+/// Place in `component` of the patch nearest to a contact pose.
+#[must_use]
+pub fn nearest(patches: &[Patch], component: &[usize], here: &Isometry3<f64>) -> usize {
+    let distance = |&i: &usize| apart(patches, component[i], here);
+    (0..component.len())
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)))
+        .unwrap_or(0)
+}
+
+fn apart(patches: &[Patch], patch: usize, here: &Isometry3<f64>) -> f64 {
+    (patches[patch].centre.coords - here.translation.vector).norm()
+}
+
+/// A stop for each heading in which an edge leaves the patch; one for a lone patch.
+#[must_use]
+pub fn incident_stops(graph: &Graph, patch: usize) -> Vec<Stop> {
+    let edges = &graph.incident[patch];
+    if edges.is_empty() {
+        return vec![Stop { patch, heading: 0.0 }];
+    }
+    edges.iter().map(|&e| Stop { patch, heading: graph.edges[e].leaving(patch) }).collect()
+}
+
+/// The places 0…`count` − 1 of a closed tour as a path from `first` on: in the direction that does
+/// without the dearer of the two ways at it. `way` gives the cost from one place to another.
+#[must_use]
+pub fn cut(count: usize, first: usize, way: impl Fn(usize, usize) -> f64) -> Vec<usize> {
+    let before = (first + count - 1) % count;
+    if way(before, first) >= way(first, (first + 1) % count) {
+        (0..count).map(|k| (first + k) % count).collect()
+    } else {
+        (0..count).map(|k| (first + count - k) % count).collect()
+    }
 }
 
 /// The contact pose of a stop, root frame.
@@ -132,37 +202,21 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    fn solve(&self, method: Method, seed: u64) -> Result<Vec<Stop>, FormulationError> {
-        match method {
-            Method::Tsp => {
-                let nodes: Vec<Vec<Stop>> = self
-                    .component
-                    .iter()
-                    .map(|&patch| vec![Stop { patch, heading: 0.0 }])
-                    .collect();
-                let order = self.search(&nodes, seed, |a, b| {
-                    (a.translation.vector - b.translation.vector).norm()
-                })?;
-                let patches: Vec<usize> = order.iter().map(|s| s.patch).collect();
-                Ok(self.headings_along(&patches))
-            }
-            Method::Curvature => {
-                let nodes: Vec<Vec<Stop>> =
-                    self.component.iter().map(|&patch| self.incident_stops(patch)).collect();
-                self.search(&nodes, seed, |a, b| {
-                    curvature(a, b, self.config.beta, self.tool.symmetric)
-                })
-            }
-        }
+    /// The shortest Euclidean way.
+    fn shortest(&self, seed: u64) -> Result<Vec<Stop>, FormulationError> {
+        let nodes: Vec<Vec<Stop>> =
+            self.component.iter().map(|&patch| vec![Stop { patch, heading: 0.0 }]).collect();
+        let order =
+            self.search(&nodes, seed, |a, b| (a.translation.vector - b.translation.vector).norm())?;
+        let patches: Vec<usize> = order.iter().map(|s| s.patch).collect();
+        Ok(self.headings_along(&patches))
     }
 
-    /// A stop for each heading in which an edge leaves the patch; one for a lone patch.
-    fn incident_stops(&self, patch: usize) -> Vec<Stop> {
-        let edges = &self.graph.incident[patch];
-        if edges.is_empty() {
-            return vec![Stop { patch, heading: 0.0 }];
-        }
-        edges.iter().map(|&e| Stop { patch, heading: self.graph.edges[e].leaving(patch) }).collect()
+    /// The way of least length and turning.
+    fn smoothest(&self, seed: u64) -> Result<Vec<Stop>, FormulationError> {
+        let nodes: Vec<Vec<Stop>> =
+            self.component.iter().map(|&patch| incident_stops(self.graph, patch)).collect();
+        self.search(&nodes, seed, |a, b| curvature(a, b, self.config.beta, self.tool.symmetric))
     }
 
     /// The pad heads where it goes next (but for the edge's turn); at the end, and before a jump,
@@ -177,14 +231,14 @@ impl Problem<'_> {
                     let previous = *order.get(i.checked_sub(1)?)?;
                     edge(previous, patch).map(|e| e.leaving(patch) + std::f64::consts::PI)
                 };
-                let any = || self.incident_stops(patch)[0].heading;
+                let any = || incident_stops(self.graph, patch)[0].heading;
                 Stop { patch, heading: next.or_else(before).unwrap_or_else(any) }
             })
             .collect()
     }
 
     /// Solves the instance whose clusters are `nodes`, with `cost` between contact poses of
-    /// adjacent patches, from the start pose on: an open path.
+    /// adjacent patches: a path from the start pose on.
     fn search(
         &self,
         nodes: &[Vec<Stop>],
@@ -211,16 +265,25 @@ impl Problem<'_> {
             }
         }
         let sizes: Vec<usize> = nodes.iter().map(Vec::len).collect();
-        let start = poses.iter().flatten().map(|p| cost(&self.start, p)).collect();
-        let instance = Instance::new(
-            &sizes,
-            Costs::Blocks(blocks),
-            Jump::Uniform(JUMP),
-            Ends::OpenFromCosts(start),
-        )?;
+        let ends = if self.config.closed {
+            Ends::Closed
+        } else {
+            Ends::OpenFromCosts(poses.iter().flatten().map(|p| cost(&self.start, p)).collect())
+        };
+        let instance = Instance::new(&sizes, Costs::Blocks(blocks), Jump::Uniform(JUMP), ends)?;
         let trials = self.config.trials_per_cluster * nodes.len() as u64;
-        let solution = gtsp::solve(&instance, &Budget::trials(trials), seed)?;
-        let tour = &solution.tour;
-        Ok(tour.clusters.iter().zip(&tour.nodes).map(|(&c, &n)| nodes[c][n]).collect())
+        let tour = gtsp::solve(&instance, &Budget::trials(trials), seed)?.tour;
+        let stop = |p: usize| nodes[tour.clusters[p]][tour.nodes[p]];
+        if !self.config.closed {
+            return Ok((0..nodes.len()).map(stop).collect());
+        }
+        let way = |x: usize, y: usize| {
+            let ((a, i), (b, j)) =
+                ((tour.clusters[x], tour.nodes[x]), (tour.clusters[y], tour.nodes[y]));
+            instance.arc(a, i, b, j).unwrap_or(JUMP)
+        };
+        let nearest = nearest(self.patches, self.component, &self.start);
+        let first = tour.clusters.iter().position(|&c| c == nearest).unwrap_or(0);
+        Ok(cut(nodes.len(), first, way).into_iter().map(stop).collect())
     }
 }

@@ -114,6 +114,18 @@ pub struct Graph {
 }
 
 impl Graph {
+    /// With these edges over the reached patches.
+    fn of(edges: Vec<Edge>, reached: &[Option<Sample>], apart: Vec<(usize, usize)>) -> Self {
+        let mut incident = vec![Vec::new(); reached.len()];
+        for (i, e) in edges.iter().enumerate() {
+            incident[e.a].push(i);
+            incident[e.b].push(i);
+        }
+        let components = components(&edges, &incident, reached);
+        let candidates = edges.len() + apart.len();
+        Self { edges, incident, components, candidates, apart: apart.into_iter().collect() }
+    }
+
     /// The edge between two patches.
     #[must_use]
     pub fn between(&self, a: usize, b: usize) -> Option<usize> {
@@ -162,15 +174,26 @@ pub fn build(
         })
         .collect();
     let apart = pairs.iter().zip(&tried).filter(|(_, e)| e.is_none()).map(|(p, _)| *p).collect();
-    let edges: Vec<Edge> = tried.into_iter().flatten().collect();
+    Graph::of(tried.into_iter().flatten().collect(), reached, apart)
+}
 
-    let mut incident = vec![Vec::new(); patches.len()];
-    for (i, e) in edges.iter().enumerate() {
-        incident[e.a].push(i);
-        incident[e.b].push(i);
+/// The graph of the paper's model, between whose nodes no arm is followed: each patch's nearest
+/// neighbours joined wherever a surface line leads.
+#[must_use]
+pub fn unchecked(
+    surface: &Surface,
+    patches: &[Patch],
+    reached: &[Option<Sample>],
+    config: &GraphConfig,
+) -> Graph {
+    let (mut edges, mut apart) = (Vec::new(), Vec::new());
+    for (a, b) in neighbour_pairs(patches, reached, config) {
+        match Edge::between(surface, patches, a, b, config.line_step) {
+            Some(edge) => edges.push(edge),
+            None => apart.push((a, b)),
+        }
     }
-    let components = components(&edges, &incident, reached);
-    Graph { edges, incident, components, candidates: pairs.len(), apart }
+    Graph::of(edges, reached, apart)
 }
 
 /// Pairs (a < b) of reachable patches of which one is among the other's nearest.

@@ -19,6 +19,7 @@ pub mod track;
 
 pub mod formulation;
 pub mod gtsp;
+pub mod joint;
 
 pub mod cost;
 pub mod layered;

@@ -55,6 +55,13 @@ pub struct Mover<'a, C> {
 const LIFT_JOINTS: usize = 4;
 const LIFT_ANGLE: f64 = 0.8;
 
+/// What a jump adds to its way, for an arm of `dof` joints.
+pub(crate) fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
+    let mut lift = [0.0; nullsweep_robot::MAX_DOF];
+    lift[..LIFT_JOINTS.min(dof)].fill(LIFT_ANGLE);
+    cost.of(&lift)
+}
+
 impl<'a, C: Cost> Mover<'a, C> {
     /// For a tour over the patches `stops` and an arm that stands at `source` before the first motion.
     #[must_use]
@@ -66,9 +73,8 @@ impl<'a, C: Cost> Mover<'a, C> {
         source: JointVector,
         seed: u64,
     ) -> Self {
-        let mut lift = [0.0; nullsweep_robot::MAX_DOF];
-        lift[..LIFT_JOINTS.min(cell.arm.dof())].fill(LIFT_ANGLE);
-        Self { cell, graph, stops, cost, source, lift: cost.of(&lift), seed }
+        let lift = lift_cost(cost, cell.arm.dof());
+        Self { cell, graph, stops, cost, source, lift, seed }
     }
 
     /// The motion along an edge, or `reversed` back, its joint vectors free of collision; `None`

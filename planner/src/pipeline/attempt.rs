@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{Clock, Job, PipelineError};
 use crate::cost::{Cost, CostKind, Effort, TaskTime};
 use crate::coverage;
-use crate::formulation::{self, Stop};
+use crate::formulation::{self, Method, Stop};
 use crate::graph::{self, Graph};
 use crate::layered;
 use crate::motion::{Leg, Mover};
@@ -101,15 +101,12 @@ impl Shop<'_> {
         progress.stage("tour", None);
         let tool_pose = cell.arm.tip_pose(&self.start) * job.tool.contact_in_tip();
         let tour = clock.time("gtsp", || {
-            formulation::tour(
-                job.method,
-                &graph,
-                &patches,
-                &job.tool,
-                &tool_pose,
-                &job.formulation,
-                job.seed,
-            )
+            let order = match job.method {
+                Method::Tsp => formulation::shortest,
+                Method::Curvature => formulation::smoothest,
+                Method::Joint => return self.joint_tour(&graph, &patches, &tool_pose),
+            };
+            order(&graph, &patches, &job.tool, &tool_pose, &job.formulation, job.seed)
         })?;
         progress.stage("layered graph and transfers", None);
         let context = Context { shop: self, graph: &graph, patches: &patches, visit: &visit };

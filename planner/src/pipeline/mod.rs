@@ -2,6 +2,7 @@
 
 mod attempt;
 mod completion;
+mod joint;
 mod setting;
 
 use std::collections::BTreeMap;
