@@ -37,6 +37,8 @@ pub mod pipeline;
 pub mod progress;
 pub mod task;
 
+pub mod experiment;
+
 pub mod cli;
 pub mod export;
 pub mod publish;

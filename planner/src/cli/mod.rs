@@ -2,6 +2,7 @@
 
 mod bars;
 mod export;
+mod experiment;
 mod inspect;
 mod picture;
 mod plan;
@@ -9,6 +10,7 @@ mod publish;
 mod replan;
 mod robot;
 mod task;
+mod scene;
 
 pub use picture::{joint_axes, motion};
 
@@ -52,6 +54,8 @@ enum Command {
     Gtsp(crate::gtsp::cli::GtspArgs),
     /// Write a plan as a trajectory for other programs.
     Export(export::ExportArgs),
+    /// The paper's tables I and II, our figures beside the published ones.
+    Experiment(Box<experiment::ExperimentArgs>),
     /// Say what a plan file holds.
     Inspect(inspect::InspectArgs),
 }
@@ -74,6 +78,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
             .map(|()| OK)
             .map_err(anyhow::Error::from),
         Command::Export(args) => export::run(&args),
+        Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
     };
     match result {
