@@ -1,8 +1,8 @@
 //! The command line of `planner`.
 
 mod bars;
-mod export;
 mod experiment;
+mod export;
 mod inspect;
 mod picture;
 mod plan;
