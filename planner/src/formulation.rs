@@ -32,14 +32,14 @@ pub struct FormulationConfig {
     pub beta: f64,
     /// Trials of the search for each patch.
     pub trials_per_cluster: u64,
-    /// Search a closed tour and cut it at the pose nearest the tool, as the paper does, instead of
-    /// an open path from the tool on.
-    pub closed: bool,
+    /// Begin at the patch nearest the tool, where the paper cuts its tour, whatever the way there
+    /// costs; else that way is weighed with the rest.
+    pub from_nearest: bool,
 }
 
 impl Default for FormulationConfig {
     fn default() -> Self {
-        Self { beta: 0.9, trials_per_cluster: 100, closed: false }
+        Self { beta: 0.9, trials_per_cluster: 100, from_nearest: false }
     }
 }
 
@@ -158,18 +158,6 @@ pub fn incident_stops(graph: &Graph, patch: usize) -> Vec<Stop> {
     edges.iter().map(|&e| Stop { patch, heading: graph.edges[e].leaving(patch) }).collect()
 }
 
-/// The places 0…`count` − 1 of a closed tour as a path from `first` on: in the direction that does
-/// without the dearer of the two ways at it. `way` gives the cost from one place to another.
-#[must_use]
-pub fn cut(count: usize, first: usize, way: impl Fn(usize, usize) -> f64) -> Vec<usize> {
-    let before = (first + count - 1) % count;
-    if way(before, first) >= way(first, (first + 1) % count) {
-        (0..count).map(|k| (first + k) % count).collect()
-    } else {
-        (0..count).map(|k| (first + count - k) % count).collect()
-    }
-}
-
 /// The contact pose of a stop, root frame.
 #[must_use]
 pub fn pose(patches: &[Patch], tool: &Tool, stop: &Stop) -> Isometry3<f64> {
@@ -265,25 +253,14 @@ impl Problem<'_> {
             }
         }
         let sizes: Vec<usize> = nodes.iter().map(Vec::len).collect();
-        let ends = if self.config.closed {
-            Ends::Closed
+        let ends = if self.config.from_nearest {
+            Ends::OpenFromCluster(nearest(self.patches, self.component, &self.start))
         } else {
             Ends::OpenFromCosts(poses.iter().flatten().map(|p| cost(&self.start, p)).collect())
         };
         let instance = Instance::new(&sizes, Costs::Blocks(blocks), Jump::Uniform(JUMP), ends)?;
         let trials = self.config.trials_per_cluster * nodes.len() as u64;
         let tour = gtsp::solve(&instance, &Budget::trials(trials), seed)?.tour;
-        let stop = |p: usize| nodes[tour.clusters[p]][tour.nodes[p]];
-        if !self.config.closed {
-            return Ok((0..nodes.len()).map(stop).collect());
-        }
-        let way = |x: usize, y: usize| {
-            let ((a, i), (b, j)) =
-                ((tour.clusters[x], tour.nodes[x]), (tour.clusters[y], tour.nodes[y]));
-            instance.arc(a, i, b, j).unwrap_or(JUMP)
-        };
-        let nearest = nearest(self.patches, self.component, &self.start);
-        let first = tour.clusters.iter().position(|&c| c == nearest).unwrap_or(0);
-        Ok(cut(nodes.len(), first, way).into_iter().map(stop).collect())
+        Ok(tour.clusters.iter().zip(&tour.nodes).map(|(&c, &n)| nodes[c][n]).collect())
     }
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use nullsweep_robot::{JointVector, MAX_DOF};
 use rayon::prelude::*;
+use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 
 use super::setting::Setting;
@@ -45,6 +46,8 @@ pub struct Figures {
     pub task_time_s: f64,
     /// Time from the graph to the joint path. \[s\]
     pub calculation_s: f64,
+    /// Processor time of all threads in it: what the machine's other work does not change. \[s\]
+    pub processor_s: f64,
     /// Motions between patches that no edge joins.
     pub jumps: usize,
     /// Samples among which the method chose.
@@ -84,11 +87,11 @@ fn time(setting: &Setting) -> TaskTime {
 /// # Errors
 /// A cost that is not a number.
 pub fn by_cost<C: Cost>(setting: &Setting, task: &Task, cost: &C) -> Result<Run, FormulationError> {
-    let begin = Instant::now();
+    let (begin, processor) = (Instant::now(), processor_time());
     let metric = Metric::new(cost, setting.continuous(), setting.arm.dof(), 0.0);
     let graph = &setting.graph;
     let (patches, tool, here) = (&setting.patches, &setting.tool, setting.tool_pose());
-    let config = FormulationConfig { closed: true, ..task.formulation };
+    let config = FormulationConfig { from_nearest: true, ..task.formulation };
     let mut bytes = 0;
     let (stops, clusters): (Vec<Stop>, Vec<Cluster>) = match task.method {
         Method::Tsp | Method::Curvature => {
@@ -152,9 +155,16 @@ pub fn by_cost<C: Cost>(setting: &Setting, task: &Task, cost: &C) -> Result<Run,
         .map(|(stop, sample)| (Stop { heading: sample.heading, ..*stop }, sample.q))
         .collect();
     let calculation_s = begin.elapsed().as_secs_f64();
+    let processor_s = processor_time() - processor;
     let samples = clusters.iter().map(|c| c.samples().len()).sum();
-    let figures = Figures { calculation_s, samples, bytes, ..measure(setting, &path) };
+    let figures = Figures { calculation_s, processor_s, samples, bytes, ..measure(setting, &path) };
     Ok(Run { path, figures })
+}
+
+/// What this process has used. \[s\]
+fn processor_time() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
 /// The figures of a path that lie in it alone.

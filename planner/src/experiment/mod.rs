@@ -41,4 +41,6 @@ pub enum Quantity {
     Time,
     /// Calculation time. \[s\]
     Calculation,
+    /// Processor time of the calculation, which the paper does not tell. \[s\]
+    Processor,
 }

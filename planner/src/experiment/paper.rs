@@ -45,6 +45,7 @@ pub fn cell(
         Quantity::Effort => 1,
         Quantity::Time => 2,
         Quantity::Calculation => 3,
+        Quantity::Processor => return None,
     };
     let (mean, deviation) = table[side][block][row][column];
     (mean > 0.0).then_some((mean, deviation))

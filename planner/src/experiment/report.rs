@@ -164,6 +164,7 @@ impl Report {
             Quantity::Effort => run.effort_rad,
             Quantity::Time => run.task_time_s,
             Quantity::Calculation => run.calculation_s,
+            Quantity::Processor => run.processor_s,
         });
         Some(tables::statistic(values))
     }

@@ -8,8 +8,13 @@ use crate::cost::CostKind;
 use crate::formulation::Method;
 
 const COSTS: [CostKind; 2] = [CostKind::Time, CostKind::Effort];
-const QUANTITIES: [Quantity; 4] =
-    [Quantity::Distance, Quantity::Effort, Quantity::Time, Quantity::Calculation];
+const QUANTITIES: [Quantity; 5] = [
+    Quantity::Distance,
+    Quantity::Effort,
+    Quantity::Time,
+    Quantity::Calculation,
+    Quantity::Processor,
+];
 
 /// All tables of a report, for a page of text.
 #[must_use]
@@ -70,6 +75,7 @@ fn push_table(page: &mut String, report: &Report, cost: CostKind) {
                 let _ = write!(page, " | {ours}");
                 if let Some(object) = report.object
                     && paper::samples(object).contains(&samples)
+                    && quantity != Quantity::Processor
                 {
                     let at = |q| paper::cell(object, cost, samples, method, q);
                     let impossible = at(Quantity::Effort)
@@ -205,13 +211,13 @@ fn push_tracked(page: &mut String, report: &Report) {
 pub fn csv(report: &Report) -> String {
     let mut text = String::from(
         "model,optimised,samples,method,repeat,distance_m,effort_rad,task_time_s,calculation_s,\
-         jumps,coverage_reachable,coverage_all,line_deviation_max_m,scan_distance_p95_m,violations\n",
+         processor_s,jumps,coverage_reachable,coverage_all,line_deviation_max_m,scan_distance_p95_m,violations\n",
     );
     for cell in &report.cells {
         for (repeat, f) in cell.runs.iter().enumerate() {
             let _ = writeln!(
                 text,
-                "straight,{:?},{},{:?},{repeat},{},{},{},{},{},,,,,",
+                "straight,{:?},{},{:?},{repeat},{},{},{},{},{},{},,,,,",
                 cell.optimised,
                 cell.samples,
                 cell.method,
@@ -219,6 +225,7 @@ pub fn csv(report: &Report) -> String {
                 f.effort_rad,
                 f.task_time_s,
                 f.calculation_s,
+                f.processor_s,
                 f.jumps
             );
         }
@@ -226,7 +233,7 @@ pub fn csv(report: &Report) -> String {
     for t in &report.tracked {
         let _ = writeln!(
             text,
-            "tracked,{:?},{},{:?},{},{},{},{},{},{},{},{},{},{},{}",
+            "tracked,{:?},{},{:?},{},{},{},{},{},,{},{},{},{},{},{}",
             t.optimised,
             t.samples,
             t.method,
@@ -275,6 +282,7 @@ fn label(quantity: Quantity) -> &'static str {
         Quantity::Effort => "Effort [rad]",
         Quantity::Time => "Task time [s]",
         Quantity::Calculation => "Calc. time [s]",
+        Quantity::Processor => "Processor time [s]",
     }
 }
 

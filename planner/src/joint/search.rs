@@ -12,7 +12,7 @@ use nullsweep_robot::JointVector;
 use super::layers::Layers;
 use super::nodes::{Cluster, Metric};
 use crate::cost::Cost;
-use crate::formulation::{FormulationError, cut};
+use crate::formulation::FormulationError;
 use crate::graph::Graph;
 use crate::gtsp::{self, Block, Budget, Control, Costs, Ends, Instance, Jump, Tour};
 
@@ -31,7 +31,7 @@ pub struct JointConfig {
 
 impl Default for JointConfig {
     fn default() -> Self {
-        Self { few: 24, rounds: 8, idle: 2, trials_per_cluster: 50 }
+        Self { few: 36, rounds: 8, idle: 2, trials_per_cluster: 50 }
     }
 }
 
@@ -49,7 +49,7 @@ pub struct Problem<'a, C> {
     pub jump_extra: f64,
     /// Where the arm stands before; `None`: anywhere.
     pub source: Option<JointVector>,
-    /// Where the closed tour is cut: this cluster is the first.
+    /// The cluster that is visited first.
     pub first: usize,
 }
 
@@ -93,9 +93,6 @@ pub fn solve<C: Cost>(
     let clusters = problem.clusters;
     let samples = clusters.iter().map(|c| c.samples().len()).sum();
     let mut few: Vec<Vec<usize>> = clusters.iter().map(|c| spread(c, config.few)).collect();
-    let all_seen = |few: &[Vec<usize>]| {
-        few.iter().zip(clusters).all(|(few, all)| few.len() == all.samples().len())
-    };
     let mut best: Option<JointTour> = None;
     let mut idle = 0;
     for round in 0..config.rounds.max(1) {
@@ -103,7 +100,6 @@ pub fn solve<C: Cost>(
         let layers = problem.layers(&order);
         let forward = layers.forward();
         let (choice, cost) = layers.cheapest(&forward);
-        let complete = all_seen(&few);
         let bytes = stored
             + clusters.iter().map(Cluster::bytes).sum::<usize>()
             + 2 * samples * size_of::<f32>();
@@ -120,7 +116,7 @@ pub fn solve<C: Cost>(
             best.bytes = bytes;
             idle += 1;
         }
-        if complete || idle >= config.idle {
+        if idle >= config.idle {
             break;
         }
     }
@@ -128,7 +124,7 @@ pub fn solve<C: Cost>(
 }
 
 impl<C: Cost> Problem<'_, C> {
-    /// The order over the few samples, cut open, and the bytes that its costs take.
+    /// The order over the few samples and the bytes that its costs take.
     fn order(
         &self,
         few: &[Vec<usize>],
@@ -151,8 +147,9 @@ impl<C: Cost> Problem<'_, C> {
         // The instance's own, 8 bytes, and the search's, 4.
         let stored = entries * (size_of::<f64>() + size_of::<i32>());
         let sizes: Vec<usize> = few.iter().map(Vec::len).collect();
-        let instance =
-            Instance::new(&sizes, Costs::Blocks(blocks), Jump::Uniform(self.jump), Ends::Closed)?;
+        let ends = Ends::OpenFromCluster(self.first);
+        let jump = Jump::Uniform(self.jump);
+        let instance = Instance::new(&sizes, Costs::Blocks(blocks), jump, ends)?;
         let start = from.map(|tour| Tour {
             clusters: tour.order.clone(),
             nodes: tour
@@ -165,14 +162,7 @@ impl<C: Cost> Problem<'_, C> {
         let budget = Budget::trials(config.trials_per_cluster * sizes.len() as u64);
         let control = Control { start: start.as_ref(), ..Control::default() };
         let tour = gtsp::solve_with(&instance, &budget, seed, control)?.tour;
-        let way = |x: usize, y: usize| {
-            let ((a, i), (b, j)) =
-                ((tour.clusters[x], tour.nodes[x]), (tour.clusters[y], tour.nodes[y]));
-            instance.arc(a, i, b, j).unwrap_or(self.jump)
-        };
-        let first = tour.clusters.iter().position(|&c| c == self.first).unwrap_or(0);
-        let order = cut(tour.clusters.len(), first, way);
-        Ok((order.into_iter().map(|p| tour.clusters[p]).collect(), stored))
+        Ok((tour.clusters, stored))
     }
 
     fn layers(&self, order: &[usize]) -> Layers<'_, C> {
