@@ -9,8 +9,8 @@ mod plan;
 mod publish;
 mod replan;
 mod robot;
-mod task;
 mod scene;
+mod task;
 
 pub use picture::{joint_axes, motion};
 
