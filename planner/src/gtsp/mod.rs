@@ -35,6 +35,7 @@ mod layered;
 mod local;
 mod order;
 mod pool;
+mod raw;
 mod search;
 mod solve;
 mod table;
