@@ -1,0 +1,300 @@
+//! The endpoint's loop: states out as they come, setpoints in, messages to the controller.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use nullsweep_executor::rt::become_real_time;
+use nullsweep_ipc_types::ports::{Ipc, now_ns};
+use nullsweep_ipc_types::{JointStates, MAX_HELD_JOINTS, status};
+use nullsweep_robot::Arm;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use crate::link::msgs::{sensor_msgs, trajectory_msgs};
+use crate::link::{Link, Names, News, Order, Service, moment, ros_time};
+use crate::stream::{DOF, Joints, Message, Rules, Stream};
+use crate::whole::Whole;
+use crate::{Common, RunArgs};
+
+/// Joint states older than this when they arrive are not passed on: the robot's clock and this
+/// one's disagree, or the network stalls. \[ns\]
+const OLD_NS: u64 = 500_000_000;
+/// The driver says each second whether its motors are halted. \[ns\]
+const SILENT_NS: u64 = 3_000_000_000;
+/// The master counts as lost so long after it was last reached. \[ns\]
+const MASTER_NS: u64 = 2_000_000_000;
+/// Time between two looks. The executor's setpoints wait in their buffer meanwhile.
+const ROUND: Duration = Duration::from_micros(500);
+
+/// Runs until SIGINT or SIGTERM.
+pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
+    let arm = args.load()?;
+    if arm.dof() != DOF {
+        bail!("the arm has {} joints, the PR2's controller takes {DOF}", arm.dof());
+    }
+    let done = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&done))?;
+    }
+    let names = Names {
+        controller: args.controller(),
+        calibrated: (!args.assume_calibrated).then(|| args.calibrated.clone()),
+    };
+    // Before the ROS side's threads are made, which inherit it. Where it is denied messages are
+    // only later now and then.
+    let _ = become_real_time(args.priority, None);
+    let link = Link::open(common, &names)?;
+    let ipc = Ipc::open(&args.robot_name, args.ipc_root.as_deref())?;
+    let mut ear = Ear::new(&arm);
+    tracing::info!("arm {} at {}, master {}", args.controller(), args.robot_name, common.master);
+    if args.whole_plan {
+        return whole_plans(&ipc, &arm, &link, &mut ear, &done);
+    }
+    let setpoints = ipc.setpoint_receiver().context("an endpoint runs already")?;
+    let states = ipc.state_sender().context("an endpoint runs already")?;
+    let delay_ns = args.delay * 1_000_000;
+    let mut stream = Stream::new(Rules {
+        delay_ns,
+        timeout_ns: args.timeout * 1_000_000,
+        stop_acceleration: args.stop_acceleration,
+        start_tolerance: 0.02,
+    });
+    let mut told = Told::default();
+    let mut due_ns = now_ns();
+    let mut disabled = false;
+    let mut ceased = false;
+    while !done.load(Ordering::Relaxed) {
+        std::thread::sleep(ROUND);
+        let health = health(&link, now_ns());
+        told.tell(health, &link);
+        while let Ok(News::Joints(message, at_ns)) = link.news.try_recv() {
+            let Some(mut state) = ear.hear(&message, at_ns) else { continue };
+            state.status = health.status;
+            if ceased {
+                state.status |= status::SETPOINT_TIMEOUT;
+            }
+            if let Some((sequence, deadline)) = stream.in_force(state.stamp_ns) {
+                state.setpoint_sequence = sequence;
+                state.setpoint_received_ns = deadline;
+            }
+            // Without master or controller the state goes stale: the executor then stops the arm
+            // on its path, and the setpoints of that stop still go out.
+            if health.is_linked {
+                states.send(&state)?;
+            }
+        }
+        let Some(measured) = ear.measured else { continue };
+        while let Some(setpoint) = setpoints.receive()? {
+            if (setpoint.disable != 0) != disabled {
+                disabled = setpoint.disable != 0;
+                let service = if disabled { Service::Halt } else { Service::Reset };
+                link.orders.send(Order::Call(service)).context("the ROS side ended")?;
+            }
+            stream.take(&setpoint, &measured);
+        }
+        let off = status::HALTED | status::CALIBRATED;
+        if health.status & off != status::CALIBRATED {
+            stream.let_go();
+        }
+        let now = now_ns();
+        ceased = stream.has_ceased(now);
+        if now >= due_ns {
+            due_ns = now.max(due_ns + args.period * 1_000_000);
+            let late = stream.late;
+            if let Some(message) = stream.message(now) {
+                let order = Order::Command(trajectory(&message, arm.joint_names()));
+                link.orders.send(order).context("the ROS side ended")?;
+            }
+            if stream.late > late {
+                tracing::warn!("a message came too late, the arm stops: is --delay too short?");
+            }
+        }
+    }
+    tracing::info!(
+        "ended: {} joint states, {} lost, {} messages late, {} setpoints refused",
+        ear.sequence,
+        link.known.lost.load(Ordering::Relaxed),
+        stream.late,
+        stream.refused
+    );
+    Ok(())
+}
+
+fn whole_plans(
+    ipc: &Ipc,
+    arm: &Arm,
+    link: &Link,
+    ear: &mut Ear,
+    done: &AtomicBool,
+) -> anyhow::Result<()> {
+    let mut whole = Whole::open(ipc, arm)?;
+    let mut told = Told::default();
+    while !done.load(Ordering::Relaxed) {
+        std::thread::sleep(Duration::from_millis(2));
+        let health = health(link, now_ns());
+        told.tell(health, link);
+        while let Ok(news) = link.news.try_recv() {
+            match news {
+                News::Joints(message, at_ns) => {
+                    if let Some(state) = ear.hear(&message, at_ns) {
+                        whole.measured(&state);
+                    }
+                }
+                News::Result(result) => whole.ended(&result)?,
+            }
+        }
+        let ready = health.is_linked && health.status == status::CALIBRATED;
+        whole.round(ready, link)?;
+    }
+    whole.close()
+}
+
+/// What can be said of the robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Health {
+    status: u32,
+    /// Whether master and controller are there.
+    is_linked: bool,
+    has_master: bool,
+}
+
+fn health(link: &Link, now: u64) -> Health {
+    let known = &link.known;
+    let silent = now.saturating_sub(known.halted_ns.load(Ordering::Relaxed)) > SILENT_NS;
+    let mut bits = 0;
+    if known.calibrated.load(Ordering::Relaxed) {
+        bits |= status::CALIBRATED;
+    }
+    if silent || known.halted.load(Ordering::Relaxed) {
+        bits |= status::HALTED;
+    }
+    let has_master = now.saturating_sub(known.master_ns.load(Ordering::Relaxed)) <= MASTER_NS;
+    let is_linked = has_master && known.controller.load(Ordering::Relaxed);
+    Health { status: bits, is_linked, has_master }
+}
+
+/// Says what changed.
+#[derive(Default)]
+struct Told(Option<Health>);
+
+impl Told {
+    fn tell(&mut self, health: Health, link: &Link) {
+        if self.0.replace(health) == Some(health) {
+            return;
+        }
+        if !health.has_master {
+            tracing::error!("the ROS master is gone: no state is passed on, the arm stops");
+        } else if !health.is_linked {
+            tracing::error!("the arm's controller does not listen: no state is passed on");
+        } else if health.status & status::CALIBRATED == 0 {
+            tracing::warn!("the joints are not calibrated");
+        } else if health.status & status::HALTED != 0 {
+            let said = link.known.halted.load(Ordering::Relaxed);
+            let why = if said { "run stop, halt or error" } else { "motors_halted is silent" };
+            tracing::warn!("the motors are halted: {why}");
+        } else {
+            tracing::info!("calibrated, motors on, controller listening");
+        }
+    }
+}
+
+/// Joint states to the executor's states.
+struct Ear {
+    names: Vec<String>,
+    held: Vec<String>,
+    measured: Option<Joints>,
+    sequence: u64,
+    warned: bool,
+}
+
+impl Ear {
+    fn new(arm: &Arm) -> Self {
+        Self {
+            names: arm.joint_names().to_vec(),
+            held: arm.held_joints().iter().map(|h| h.name.clone()).collect(),
+            measured: None,
+            sequence: 0,
+            warned: false,
+        }
+    }
+
+    /// The state, `None` for a message that cannot be used; the first such one is told.
+    fn hear(&mut self, message: &sensor_msgs::JointState, at_ns: u64) -> Option<JointStates> {
+        match self.read(message, at_ns) {
+            Ok(state) => {
+                self.warned = false;
+                Some(state)
+            }
+            Err(why) => {
+                if !std::mem::replace(&mut self.warned, true) {
+                    tracing::error!("/joint_states cannot be used: {why}");
+                }
+                None
+            }
+        }
+    }
+
+    fn read(
+        &mut self,
+        message: &sensor_msgs::JointState,
+        at_ns: u64,
+    ) -> anyhow::Result<JointStates> {
+        let find = |name: &String| {
+            let found = message.name.iter().position(|n| n == name);
+            let index = found.with_context(|| format!("joint {name} is not in it"))?;
+            let position = message.position.get(index).context("fewer positions than names")?;
+            anyhow::Ok((index, *position))
+        };
+        let stamp_ns = moment(&message.header.stamp).min(at_ns);
+        if at_ns - stamp_ns > OLD_NS {
+            bail!(
+                "its stamp is {:.2} s old: set both machines' clocks by NTP",
+                (at_ns - stamp_ns) as f64 * 1e-9
+            );
+        }
+        let mut state = <JointStates as bytemuck::Zeroable>::zeroed();
+        for (j, name) in self.names.iter().enumerate() {
+            let (index, position) = find(name)?;
+            state.positions[j] = position;
+            state.velocities[j] = message.velocity.get(index).copied().unwrap_or(0.0);
+            state.efforts[j] = message.effort.get(index).copied().unwrap_or(0.0);
+        }
+        if self.held.len() > MAX_HELD_JOINTS {
+            bail!("{} joints are held, the wire takes {MAX_HELD_JOINTS}", self.held.len());
+        }
+        for (h, name) in self.held.iter().enumerate() {
+            state.held_positions[h] = find(name)?.1;
+        }
+        self.sequence += 1;
+        state.sequence = self.sequence;
+        state.stamp_ns = stamp_ns;
+        state.held_count = self.held.len() as u32;
+        state.joint_count = DOF as u32;
+        self.measured = Some(std::array::from_fn(|j| state.positions[j]));
+        Ok(state)
+    }
+}
+
+fn trajectory(message: &Message, names: &[String]) -> trajectory_msgs::JointTrajectory {
+    let mut out = trajectory_msgs::JointTrajectory::default();
+    out.header.seq = message.sequence;
+    out.header.stamp = ros_time(message.start_ns);
+    out.joint_names = names.to_vec();
+    out.points = message.points.iter().map(|p| point(&p.q, Some(&p.v), p.after_ns)).collect();
+    out
+}
+
+/// A point; without velocities the controller goes straight.
+pub fn point(
+    q: &Joints,
+    v: Option<&Joints>,
+    after_ns: u64,
+) -> trajectory_msgs::JointTrajectoryPoint {
+    let mut out = trajectory_msgs::JointTrajectoryPoint::default();
+    out.positions = q.to_vec();
+    out.velocities = v.map_or_else(Vec::new, |v| v.to_vec());
+    out.time_from_start.sec = (after_ns / 1_000_000_000) as i32;
+    out.time_from_start.nsec = (after_ns % 1_000_000_000) as i32;
+    out
+}

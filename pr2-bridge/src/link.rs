@@ -1,0 +1,281 @@
+//! The ROS side: topics, services, and whether the master is there. Everything that blocks or
+//! waits is in tasks of its own; the endpoint's loop exchanges values with them through channels.
+
+use std::net::ToSocketAddrs;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc as std_mpsc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use anyhow::{Context, bail};
+use nullsweep_ipc_types::ports::now_ns;
+use roslibrust::ros1::NodeHandle;
+use tokio::sync::mpsc;
+
+use crate::Common;
+
+#[allow(missing_docs, clippy::all)] // Generated from msgs/.
+pub mod msgs {
+    roslibrust::generate_ros_types!("msgs");
+}
+
+use msgs::{control_msgs, sensor_msgs, std_msgs, std_srvs, trajectory_msgs};
+
+/// A service of the driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Service {
+    /// Clears errors and turns the motors on.
+    Reset,
+    /// Turns the motors off.
+    Halt,
+}
+
+impl Service {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Reset => "reset_motors",
+            Self::Halt => "halt_motors",
+        }
+    }
+}
+
+/// What goes to ROS.
+#[derive(Clone, Debug)]
+pub enum Order {
+    /// To the controller's command topic.
+    Command(trajectory_msgs::JointTrajectory),
+    /// To its action.
+    Goal(Box<control_msgs::FollowJointTrajectoryActionGoal>),
+    /// To a service of the driver.
+    Call(Service),
+}
+
+/// What comes from ROS, with the moment of its arrival. \[ns, `CLOCK_MONOTONIC`\]
+#[derive(Debug)]
+pub enum News {
+    /// All joints.
+    Joints(sensor_msgs::JointState, u64),
+    /// The end of a goal.
+    Result(Box<control_msgs::FollowJointTrajectoryActionResult>),
+}
+
+/// What the tasks know, for the loop to look at.
+#[derive(Debug, Default)]
+pub struct Known {
+    /// When the master was last reached. \[ns\]
+    pub master_ns: AtomicU64,
+    /// Whether the controller listens.
+    pub controller: AtomicBool,
+    /// Whether the motors are halted, and when that was last said.
+    pub halted: AtomicBool,
+    /// \[ns\]
+    pub halted_ns: AtomicU64,
+    /// Whether the joints are calibrated.
+    pub calibrated: AtomicBool,
+    /// Messages that came too fast for this process.
+    pub lost: AtomicU64,
+}
+
+/// The loop's end of the channels.
+pub struct Link {
+    /// To ROS.
+    pub orders: mpsc::UnboundedSender<Order>,
+    /// From ROS.
+    pub news: std_mpsc::Receiver<News>,
+    /// What the tasks know.
+    pub known: Arc<Known>,
+    // Runs the tasks.
+    _runtime: tokio::runtime::Runtime,
+}
+
+/// Names on the ROS side.
+#[derive(Clone, Debug)]
+pub struct Names {
+    /// The controller's namespace.
+    pub controller: String,
+    /// Where calibration is told; `None`: it is taken for granted.
+    pub calibrated: Option<String>,
+}
+
+/// How often the master is looked for.
+const LOOK: Duration = Duration::from_millis(500);
+
+impl Link {
+    /// Connects to the master and starts the tasks.
+    pub fn open(common: &Common, names: &Names) -> anyhow::Result<Self> {
+        let runtime = runtime()?;
+        let (orders, order_queue) = mpsc::unbounded_channel();
+        let (news_sender, news) = std_mpsc::channel();
+        let known = Arc::new(Known::default());
+        known.halted.store(true, Ordering::Relaxed);
+        known.calibrated.store(names.calibrated.is_none(), Ordering::Relaxed);
+        runtime.block_on(start(common, names, order_queue, news_sender, Arc::clone(&known)))?;
+        Ok(Self { orders, news, known, _runtime: runtime })
+    }
+}
+
+/// Calls a service once.
+pub fn call(common: &Common, service: Service) -> anyhow::Result<()> {
+    runtime()?.block_on(async {
+        let node = connect(&common.master).await?;
+        let name = format!("{}/{}", common.driver, service.name());
+        let client = node
+            .service_client::<std_srvs::Empty>(&name)
+            .await
+            .with_context(|| format!("no service {name}"))?;
+        client.call(&std_srvs::EmptyRequest {}).await.with_context(|| format!("{name} failed"))?;
+        println!("{name}: done");
+        Ok(())
+    })
+}
+
+/// ROS time of a moment on `CLOCK_MONOTONIC`.
+pub fn ros_time(at_ns: u64) -> roslibrust::codegen::integral_types::Time {
+    let total = wall_ns() + i128::from(at_ns) - i128::from(now_ns());
+    roslibrust::codegen::integral_types::Time {
+        secs: (total / 1_000_000_000) as i32,
+        nsecs: (total % 1_000_000_000) as i32,
+    }
+}
+
+/// The moment on `CLOCK_MONOTONIC` of a ROS time, 0 for one before the machine started. \[ns\]
+pub fn moment(time: &roslibrust::codegen::integral_types::Time) -> u64 {
+    let stamp = i128::from(time.secs) * 1_000_000_000 + i128::from(time.nsecs);
+    u64::try_from(i128::from(now_ns()) + stamp - wall_ns()).unwrap_or(0)
+}
+
+fn wall_ns() -> i128 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as i128)
+}
+
+fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
+    Ok(tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?)
+}
+
+async fn connect(master: &str) -> anyhow::Result<NodeHandle> {
+    let limit = Duration::from_secs(5);
+    match tokio::time::timeout(limit, NodeHandle::new(master, "/nullsweep_bridge")).await {
+        Ok(Ok(node)) => Ok(node),
+        Ok(Err(error)) => Err(error)
+            .with_context(|| format!("no ROS master at {master}: start roscore, or set --master")),
+        Err(_) => bail!("the ROS master at {master} did not answer within {limit:?}"),
+    }
+}
+
+async fn start(
+    common: &Common,
+    names: &Names,
+    mut orders: mpsc::UnboundedReceiver<Order>,
+    news: std_mpsc::Sender<News>,
+    known: Arc<Known>,
+) -> anyhow::Result<()> {
+    let node = connect(&common.master).await?;
+    known.master_ns.store(now_ns(), Ordering::Relaxed);
+
+    let mut joints = node.subscribe::<sensor_msgs::JointState>("/joint_states", 20).await?;
+    let (sender, lost) = (news.clone(), Arc::clone(&known));
+    tokio::spawn(async move {
+        while let Some(message) = joints.next().await {
+            match message {
+                Ok(state) => drop(sender.send(News::Joints(state, now_ns()))),
+                Err(_) => drop(lost.lost.fetch_add(1, Ordering::Relaxed)),
+            }
+        }
+    });
+    let topic = format!("{}/follow_joint_trajectory/result", names.controller);
+    let mut results =
+        node.subscribe::<control_msgs::FollowJointTrajectoryActionResult>(&topic, 10).await?;
+    tokio::spawn(async move {
+        while let Some(message) = results.next().await {
+            if let Ok(result) = message {
+                drop(news.send(News::Result(Box::new(result))));
+            }
+        }
+    });
+    let topic = format!("{}/motors_halted", common.driver);
+    let mut halted = node.subscribe::<std_msgs::Bool>(&topic, 5).await?;
+    let own = Arc::clone(&known);
+    tokio::spawn(async move {
+        while let Some(message) = halted.next().await {
+            if let Ok(flag) = message {
+                own.halted.store(flag.data, Ordering::Relaxed);
+                own.halted_ns.store(now_ns(), Ordering::Relaxed);
+            }
+        }
+    });
+    if let Some(topic) = &names.calibrated {
+        let mut calibrated = node.subscribe::<std_msgs::Bool>(topic, 5).await?;
+        let own = Arc::clone(&known);
+        tokio::spawn(async move {
+            while let Some(message) = calibrated.next().await {
+                if let Ok(flag) = message {
+                    own.calibrated.store(flag.data, Ordering::Relaxed);
+                }
+            }
+        });
+    }
+
+    let topic = format!("{}/command", names.controller);
+    let command = node.advertise::<trajectory_msgs::JointTrajectory>(&topic, 20, false).await?;
+    let topic = format!("{}/follow_joint_trajectory/goal", names.controller);
+    let goal =
+        node.advertise::<control_msgs::FollowJointTrajectoryActionGoal>(&topic, 5, false).await?;
+    let own = Arc::clone(&known);
+    let driver = common.driver.clone();
+    tokio::spawn(async move {
+        let mut look = tokio::time::interval(Duration::from_millis(20));
+        loop {
+            let order = tokio::select! {
+                order = orders.recv() => order,
+                _ = look.tick() => {
+                    let listens = command.has_connected_clients() || goal.has_connected_clients();
+                    own.controller.store(listens, Ordering::Relaxed);
+                    continue;
+                }
+            };
+            let failed = match order {
+                None => break,
+                Some(Order::Command(message)) => command.publish(&message).await.err(),
+                Some(Order::Goal(message)) => goal.publish(&message).await.err(),
+                Some(Order::Call(service)) => {
+                    let (node, name) = (node.clone(), format!("{driver}/{}", service.name()));
+                    tokio::spawn(async move {
+                        let called = async {
+                            let client = node.service_client::<std_srvs::Empty>(&name).await?;
+                            client.call(&std_srvs::EmptyRequest {}).await?;
+                            anyhow::Ok(())
+                        };
+                        match called.await {
+                            Ok(()) => tracing::info!("{name}: called"),
+                            Err(error) => tracing::error!("{name}: {error:#}"),
+                        }
+                    });
+                    None
+                }
+            };
+            if let Some(error) = failed {
+                tracing::error!("a message could not be sent: {error}");
+            }
+        }
+    });
+
+    let address = common.master.trim_start_matches("http://").trim_end_matches('/').to_owned();
+    tokio::task::spawn_blocking(move || {
+        loop {
+            let reached = address
+                .to_socket_addrs()
+                .ok()
+                .and_then(|mut all| all.next())
+                .is_some_and(|a| std::net::TcpStream::connect_timeout(&a, LOOK).is_ok());
+            if reached {
+                known.master_ns.store(now_ns(), Ordering::Relaxed);
+            }
+            // Ends with the process's last handle to what it tells.
+            if Arc::strong_count(&known) == 1 {
+                return;
+            }
+            std::thread::sleep(LOOK);
+        }
+    });
+    Ok(())
+}
