@@ -3,6 +3,7 @@
     pip install iceoryx2==0.10.0
 """
 
+import ctypes
 import sys
 import time
 
@@ -127,9 +128,10 @@ class PlanPublisher:
         header.checksum = 0
         header.checksum = checksum(bytes(header) + b"".join(bytes(k) for k in knots))
         sample = self._port.loan_slice_uninit(len(knots))
-        sample.user_header().contents = header
+        ctypes.memmove(sample.user_header(), ctypes.byref(header), ctypes.sizeof(header))
+        payload = sample.payload()
         for i, knot in enumerate(knots):
-            sample.payload()[i] = knot
+            payload[i] = knot
         reached = sample.assume_init().send()
         return types.PlanId(header.id.epoch, header.id.number) if reached else None
 

@@ -39,7 +39,7 @@ const SIZES: [(&str, usize); 9] = [
 ];
 
 /// The Python module.
-pub fn module() -> String {
+pub(crate) fn module() -> String {
     let mut out = String::from(
         "\"\"\"What crosses a process boundary in Nullsweep, as ctypes structures.\n\n\
          Generated from the Rust types, do not edit:\n\
