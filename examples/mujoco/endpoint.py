@@ -1,0 +1,246 @@
+"""A PR2 arm in MuJoCo as the executor's hardware endpoint: setpoints in, joint states out, 1 kHz.
+
+    python3 endpoint.py PLAN.json [--picture arm.png] [--json figures.json]
+
+Stands where the plan begins. At its end (SIGINT, SIGTERM) it prints the tracking error and how
+much of the plan's surface the measured positions have swept. Needs mujoco, numpy, iceoryx2==0.10.0
+and xxhash; matplotlib for the picture.
+"""
+
+import argparse
+import collections
+import json
+import math
+import os
+import pathlib
+import signal
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "python"))
+
+import model as arm_model
+import nullsweep_ipc
+import nullsweep_types as types
+
+try:
+    import mujoco
+    import numpy as np
+except ImportError as error:
+    sys.exit(f"{error}: pip install mujoco numpy iceoryx2==0.10.0 xxhash matplotlib")
+
+STEP_NS = 1_000_000
+START_TOLERANCE = 0.02
+
+
+class Simulation:
+    """The arm, its joint controllers, and time that only goes on when it is told to."""
+
+    def __init__(self, plan, urdf):
+        self.joints = plan["joints"]
+        self.dof = len(self.joints)
+        held = {h["name"]: h["position"] for h in plan["held"]}
+        self.model = mujoco.MjModel.from_xml_string(arm_model.mjcf(urdf, self.joints, held))
+        self.data = mujoco.MjData(self.model)
+        self.data.qpos[:] = plan["knots"][0]["q"][: self.dof]
+        mujoco.mj_forward(self.model, self.data)
+        p, d = arm_model.gains(self.joints)
+        self.p, self.d = np.array(p), np.array(d)
+        self.wanted = self.data.qpos.copy()
+        self.speed = np.zeros(self.dof)
+        self.enabled = True
+
+    def step(self):
+        effort = self.p * (self.wanted - self.data.qpos) + self.d * (self.speed - self.data.qvel)
+        # The joints' viscous damping is known, so it is fed forward.
+        effort += self.model.dof_damping * self.speed
+        self.data.ctrl[:] = effort if self.enabled else 0.0
+        mujoco.mj_step(self.model, self.data)
+
+    def hold(self):
+        self.wanted = self.data.qpos.copy()
+        self.speed[:] = 0.0
+
+
+def swept(plan, model, postures):
+    """Which scanned points the pad passes over, as the planner counts it."""
+    tool = plan["tool"]
+    points = np.array([s["p"] for s in plan["surface"]])
+    normals = np.array([s["n"] for s in plan["surface"]])
+    data = mujoco.MjData(model)
+    z = np.array(tool["approach"]) / np.linalg.norm(tool["approach"])
+    y = np.array(tool["across"]) - z * np.dot(tool["across"], z)
+    y /= np.linalg.norm(y)
+    axes = np.stack([np.cross(y, z), y, z])
+    tip = plan["joints"][0][0] + "_gripper_tool_frame"
+    hit = np.zeros(len(points), bool)
+    pads = []
+    reach = 0.5 * math.hypot(tool["length"], tool["width"]) + tool["reach_normal"]
+    for q in postures:
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        body = data.body(tip)
+        rotation = body.xmat.reshape(3, 3)
+        centre = body.xpos + rotation @ np.array(tool["centre"])
+        pads.append(centre)
+        x, y, z = (rotation @ axis for axis in axes)
+        offset = points - centre - z * tool["stand_off"]
+        near = np.flatnonzero(np.einsum("ij,ij->i", offset, offset) <= reach * reach)
+        o = offset[near]
+        ok = (np.abs(o @ x) <= 0.5 * tool["width"]) & (np.abs(o @ y) <= 0.5 * tool["length"])
+        ok &= np.abs(o @ z) <= tool["reach_normal"]
+        ok &= -(normals[near] @ z) >= math.cos(tool["reach_angle"])
+        hit[near[ok]] = True
+    return hit, np.array(pads)
+
+
+def share(hit, plan):
+    reachable = np.array([s["r"] for s in plan["surface"]])
+    return float(hit[reachable].mean()), float(hit.mean())
+
+
+def picture(path, plan, simulation, hit, pads, rows):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=(13, 6))
+    scene = figure.add_subplot(1, 2, 1, projection="3d")
+    points = np.array([s["p"] for s in plan["surface"]])
+    scene.scatter(*points[hit].T, s=1, c="#2a8a4a", label="swept")
+    scene.scatter(*points[~hit].T, s=1, c="#c0c4cc", label="not swept")
+    scene.plot(*pads.T, lw=0.7, c="#d1350f", label="pad, measured")
+    middle = len(rows) // 2
+    simulation.data.qpos[:] = rows[middle][1]
+    mujoco.mj_kinematics(simulation.model, simulation.data)
+    chain = [simulation.data.body(i).xpos.copy() for i in range(1, simulation.model.nbody)]
+    scene.plot(*np.array(chain).T, "o-", c="#30343c", lw=3, ms=4, label="arm")
+    scene.set_box_aspect(np.ptp(np.vstack([points, chain]), axis=0))
+    scene.legend(loc="upper left", fontsize=8)
+    scene.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    chart = figure.add_subplot(1, 2, 2)
+    times = np.array([r[0] for r in rows])
+    errors = np.array([np.abs(r[1] - r[2]) for r in rows])
+    for j, name in enumerate(plan["joints"]):
+        chart.plot(times, errors[:, j], lw=0.7, label=name)
+    chart.set(xlabel="time [s]", ylabel="tracking error [rad]")
+    chart.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("plan", help="stand where this plan begins, and measure what is swept of it")
+    parser.add_argument("--robot-name", default="pr2")
+    parser.add_argument("--ipc-root", help="iceoryx2's root path, if not the default")
+    parser.add_argument("--urdf", default=HERE.parent.parent / "robot" / "pr2.urdf")
+    parser.add_argument("--timeout", type=float, default=20.0,
+                        help="stop by itself so long after the last deadline [ms]")
+    parser.add_argument("--picture", help="where the picture is written, PNG")
+    parser.add_argument("--json", help="where the figures are written")
+    args = parser.parse_args()
+    with open(args.plan) as file:
+        plan = json.load(file)
+    simulation = Simulation(plan, args.urdf)
+    dof = simulation.dof
+
+    ipc = nullsweep_ipc.Ipc(args.robot_name, args.ipc_root)
+    setpoints = ipc.receiver("setpoint", types.Setpoint)
+    states = ipc.sender("state", types.JointStates)
+    done = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: done.append(True))
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(60))
+    except PermissionError:
+        pass
+    print("mujoco endpoint: ready", flush=True)
+
+    state = types.JointStates()
+    state.joint_count, state.held_count = dof, len(plan["held"])
+    for i, held in enumerate(plan["held"]):
+        state.held_positions[i] = held["position"]
+    waiting, rows = collections.deque(), []
+    following = timed_out = disabled = False
+    last_deadline = None
+    began = clock = nullsweep_ipc.now_ns()
+    refused = timeouts = 0
+    while not done:
+        now = nullsweep_ipc.now_ns()
+        if now < clock + STEP_NS:
+            time.sleep((clock + STEP_NS - now) * 1e-9)
+        now = nullsweep_ipc.now_ns()
+        waiting.extend(setpoints.all())
+        # A process that stalls simulates what the arm did meanwhile.
+        while clock + STEP_NS <= now:
+            clock += STEP_NS
+            while waiting and waiting[0].stamp_ns <= clock:
+                s = waiting.popleft()
+                values = list(s.positions[:dof]) + list(s.velocities[:dof])
+                if s.joint_count != dof or not all(map(math.isfinite, values)):
+                    refused += 1
+                    continue
+                last_deadline, timed_out = s.deadline_ns, False
+                state.setpoint_sequence, state.setpoint_received_ns = s.sequence, clock
+                disabled = s.disable != 0
+                simulation.enabled = not disabled
+                wanted = np.array(s.positions[:dof])
+                if disabled:
+                    following = False
+                    continue
+                if not following:
+                    # It begins to follow only what is where the arm is.
+                    if np.abs(wanted - simulation.data.qpos).max() > START_TOLERANCE:
+                        refused += 1
+                        continue
+                    following = True
+                simulation.wanted, simulation.speed = wanted, np.array(s.velocities[:dof])
+            if following and clock > last_deadline + args.timeout * 1e6:
+                simulation.hold()
+                following, timed_out = False, True
+                timeouts += 1
+            simulation.step()
+            if (clock - began) // STEP_NS % 5 == 0:
+                rows.append(((clock - began) * 1e-9, simulation.data.qpos.copy(),
+                             simulation.wanted.copy()))
+        state.sequence += 1
+        state.stamp_ns = clock
+        state.positions[:dof] = simulation.data.qpos
+        state.velocities[:dof] = simulation.data.qvel
+        state.efforts[:dof] = simulation.data.ctrl
+        state.status = (types.CALIBRATED | (types.HALTED if disabled else 0)
+                        | (types.SETPOINT_TIMEOUT if timed_out else 0))
+        states.send(state)
+
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    if not rows:
+        sys.exit("nothing was recorded")
+    error = np.array([np.abs(r[1] - r[2]).max() for r in rows])
+    # The pad moves by less than a third of its width in 20 ms.
+    hit, pads = swept(plan, simulation.model, [r[1] for r in rows[::4]])
+    asked, _ = swept(plan, simulation.model, [r[2] for r in rows[::4]])
+    figures = {
+        "seconds": rows[-1][0],
+        "tracking_p50_rad": float(np.percentile(error, 50)),
+        "tracking_p95_rad": float(np.percentile(error, 95)),
+        "tracking_max_rad": float(error.max()),
+        "swept_reachable": share(hit, plan)[0],
+        "swept_all": share(hit, plan)[1],
+        "commanded_swept_reachable": share(asked, plan)[0],
+        "measured_of_commanded": float(hit.sum() / max(asked.sum(), 1)),
+        "timeouts": timeouts,
+        "refused": refused,
+    }
+    for name, value in figures.items():
+        print(f"{name:28} {value:.5g}")
+    if args.json:
+        pathlib.Path(args.json).write_text(json.dumps(figures, indent=2))
+    if args.picture:
+        picture(args.picture, plan, simulation, hit, pads, rows)
+
+
+if __name__ == "__main__":
+    main()
