@@ -44,3 +44,55 @@ pub enum Quantity {
     /// Processor time of the calculation, which the paper does not tell. \[s\]
     Processor,
 }
+
+#[cfg(test)]
+mod tests {
+    use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    use super::*;
+    use crate::cost::CostKind;
+    use crate::formulation::FormulationConfig;
+    use crate::joint::JointConfig;
+    use crate::progress::Silent;
+    use crate::scan::{self, CleanConfig, Placement};
+    use crate::simulate;
+    use crate::tool::Tool;
+
+    #[test]
+    fn every_method_visits_every_reached_patch_once_and_the_joint_one_pays_least() {
+        let view = simulate::bobby_car(3);
+        let placed = scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose)).0;
+        let (scan, _) = scan::clean(&placed, &CleanConfig::default()).expect("a surface");
+        let tool = Tool { symmetric: false, ..Tool::default() };
+        let spec = ArmSpec::pr2(Side::Right);
+        let (patches, graph) = (Default::default(), Default::default());
+        let setting = Setting::new(&Robot::pr2(), &spec, &tool, &scan, &patches, &graph, 3)
+            .expect("within reach");
+        let reached: Vec<usize> =
+            (0..setting.patches.len()).filter(|&i| setting.reached[i].is_some()).collect();
+        assert!(reached.len() > 30, "{}", reached.len());
+        let short = Plan {
+            object: Some(Object::BobbyCar),
+            title: "car".into(),
+            samples: vec![1],
+            repeats: 1,
+            seed: 1,
+            formulation: FormulationConfig { trials_per_cluster: 20, ..Default::default() },
+            joint: JointConfig { rounds: 2, trials_per_cluster: 20, ..JointConfig::default() },
+        };
+        let (report, shown) = run(&setting, &short, &Silent).expect("costs are numbers");
+        for (method, run) in &shown {
+            let mut visited: Vec<usize> = run.path.iter().map(|(stop, _)| stop.patch).collect();
+            visited.sort_unstable();
+            assert_eq!(visited, reached, "{method:?}");
+            assert!(run.path.iter().all(|(_, q)| setting.arm.within_margins(q)), "{method:?}");
+            assert!(V_MAX * run.figures.task_time_s <= run.figures.effort_rad, "{method:?}");
+        }
+        let effort = |m| report.statistic(CostKind::Effort, 1, m, Quantity::Effort).map(|s| s.0);
+        let [tsp, curvature, joint] = METHODS.map(effort);
+        assert!(joint < curvature && curvature < tsp, "{tsp:?} {curvature:?} {joint:?}");
+        let page = markdown(&report);
+        assert!(page.contains("206.66 ± 3.52"), "{page}");
+        assert_eq!(csv(&report).lines().count(), 1 + report.cells.len());
+    }
+}

@@ -278,6 +278,8 @@ mod tests {
                 tour.cost
             };
             let (turns, whole) = (solve(8), solve(40));
+            let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+            assert_eq!(alone.install(|| solve(8)), turns);
             assert!(turns < 1.05 * whole, "{turns} {whole}");
         }
     }
