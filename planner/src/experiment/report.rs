@@ -1,5 +1,6 @@
 //! Runs an experiment and holds what came of it.
 
+use nalgebra::Point3;
 use nullsweep_robot::Robot;
 use serde::{Deserialize, Serialize};
 
@@ -274,10 +275,7 @@ pub fn look_between(
             let t = k as f64 / STEPS as f64;
             let between = std::array::from_fn(|j| p[j] + t * (q[j] - p[j]));
             let pad = setting.arm.tip_pose(&between) * contact;
-            off.push(
-                (setting.surface.distance(&pad.translation.vector.into()) - setting.tool.stand_off)
-                    .abs(),
-            );
+            off.push(off_surface(setting, &pad.translation.vector.into()));
         }
     }
     off.sort_by(f64::total_cmp);
@@ -285,6 +283,17 @@ pub fn look_between(
         straight.off_surface_m = [0.5, 0.95, 1.0].map(|share| off[(share * last as f64) as usize]);
     }
     Ok(straight)
+}
+
+/// How far the pad's centre is from where it belongs. \[m\]
+fn off_surface(setting: &Setting, pad: &Point3<f64>) -> f64 {
+    let mut distance = setting.surface.distance(pad);
+    if distance.is_infinite() {
+        // So far off, the nearest point will do.
+        let points = setting.scan.points.iter();
+        distance = points.map(|p| (p - pad).norm()).fold(f64::INFINITY, f64::min);
+    }
+    (distance - setting.tool.stand_off).abs()
 }
 
 /// Plans in the tracked model with all methods and costs. `job` says all but these; the stance that
