@@ -10,8 +10,19 @@ use crate::fit::{HeightFit, PlaneFit, weight};
 use crate::grid::Grid;
 use crate::scan::Scan;
 
-/// Radius of the fit on smoothed points; at least four spacings are taken. \[m\]
+/// Radius of the fit on smoothed points; at least four spacings are taken, and more where the points
+/// are noisy. \[m\]
 const FIT_RADIUS: f64 = 0.015;
+
+/// Noise of the points up to which that radius suffices: the slope of a fit is the noise over the
+/// radius and the root of the number of points, so the radius grows with the noise's root. \[m\]
+const NOISE: f64 = 0.0004;
+
+/// How much it may grow.
+const WIDEST: f64 = 1.5;
+
+/// Points at which the noise is measured.
+const NOISE_SAMPLES: usize = 100;
 
 /// Radius of the fit on raw points, which still carry the sensor's noise. \[m\]
 const RAW_RADIUS: f64 = 0.020;
@@ -63,9 +74,13 @@ impl Surface {
         let points: Vec<_> = order.iter().map(|&i| scan.points[i]).collect();
         let raw_order = Grid::new(&scan.raw, raw_radius).order();
         let raw: Vec<_> = raw_order.iter().map(|&i| scan.raw[i]).collect();
+        let normals: Vec<_> = order.iter().map(|&i| scan.normals[i]).collect();
+        let grid = Grid::new(&points, radius);
+        let widening = (noise(&grid, &points, &normals, radius) / NOISE).sqrt();
+        let radius = radius * widening.clamp(1.0, WIDEST);
         Self {
             grid: Grid::new(&points, radius),
-            normals: order.iter().map(|&i| scan.normals[i]).collect(),
+            normals,
             raw_grid: Grid::new(&raw, raw_radius),
             raw_normals: raw_order.iter().map(|&i| scan.normals[i]).collect(),
             raw,
@@ -210,6 +225,29 @@ impl Surface {
         }
         Some(())
     }
+}
+
+/// Median distance of points from the surface fitted to their neighbours, as the standard deviation
+/// of normal noise. \[m\]
+fn noise(grid: &Grid, points: &[Point3<f64>], normals: &[UnitVector3<f64>], radius: f64) -> f64 {
+    let step = (points.len() / NOISE_SAMPLES).max(1);
+    let mut off: Vec<f64> = (0..points.len())
+        .step_by(step)
+        .filter_map(|i| {
+            let mut fit = HeightFit::new(points[i], &normals[i], radius);
+            let mut count = 0;
+            grid.within(&points[i], radius, |index, position, squared| {
+                if normals[index as usize].dot(&normals[i]) > 0.5 {
+                    count += 1;
+                    fit.add(position, weight(squared / (radius * radius)));
+                }
+            });
+            let (foot, _) = fit.solve().filter(|_| count >= MIN_POINTS)?;
+            Some((points[i] - foot).norm())
+        })
+        .collect();
+    off.sort_by(f64::total_cmp);
+    1.48 * off.get(off.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// A direction between two; `None` if they are opposite.
