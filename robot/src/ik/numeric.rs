@@ -49,6 +49,10 @@ const RESIDUAL: f64 = 1e-10;
 const STRIDE: f64 = 0.8;
 /// Two solutions nearer than this are one. \[rad\]
 const SAME: f64 = 1e-5;
+/// A step that leaves less than this part of the squared error converges, and one that comes this
+/// near to a known solution \[rad\] meanwhile ends there.
+const CONVERGING: f64 = 0.04;
+const CAUGHT: f64 = 0.03;
 /// Farther from the start than this, a followed branch is reached in smaller steps. \[rad\]
 const NEAR: f64 = 0.3;
 /// Finest division of such a way.
@@ -117,8 +121,14 @@ impl Numeric {
         ranked.into_iter().map(|(_, q)| q).collect()
     }
 
-    /// Descends to the target inside the limits; the redundant joint does not move.
-    fn descend(&self, target: &Isometry3<f64>, q: &mut JointVector) -> Option<Jacobian> {
+    /// Descends to the target inside the limits; the redundant joint does not move. `None` also as
+    /// soon as the descent is about to end in one of the solutions `known`.
+    fn descend(
+        &self,
+        target: &Isometry3<f64>,
+        known: &[Solution],
+        q: &mut JointVector,
+    ) -> Option<Jacobian> {
         let mut damping = 1e-3;
         self.clamp(q);
         let (mut error, mut jacobian) = self.linearise(target, q);
@@ -134,6 +144,9 @@ impl Numeric {
             stalled = if ratio > 0.9 { stalled + 1 } else { 0 };
             if ratio < 1.0 {
                 (*q, error, jacobian) = (trial, trial_error, trial_jacobian);
+                if ratio < CONVERGING && known.iter().any(|s| same(&s.q, q, CAUGHT)) {
+                    return None;
+                }
                 damping = (damping * 0.1).max(1e-14);
             } else if damping > 1e2 || error.amax() < RESIDUAL {
                 break;
@@ -147,30 +160,30 @@ impl Numeric {
     /// A damped step; joints that it would push past a limit stay there, and the others step again
     /// without them.
     fn step(&self, jacobian: &Jacobian, error: &Vector6<f64>, damping: f64, q: &mut JointVector) {
-        let mut free = *jacobian;
         let start = *q;
+        let mut free = [false; MAX_DOF];
+        free[..self.chain.dof()].fill(true);
+        if let Some(held) = self.redundant {
+            free[held] = false;
+        }
         for _ in 0..2 {
-            let mut gram = free * free.transpose();
-            for i in 0..6 {
-                gram[(i, i)] += damping;
-            }
-            let Some(factor) = gram.cholesky() else { return };
-            let step = free.transpose() * factor.solve(error);
-            let scale = (STRIDE / step.amax()).min(1.0);
-            *q = std::array::from_fn(|i| start[i] + scale * step[i]);
+            let step = damped_step(jacobian, &free, error, damping);
+            let most = step.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+            let scale = if most > STRIDE { STRIDE / most } else { 1.0 };
             let mut stopped = false;
-            for (i, &(lower, upper)) in self.margined.iter().enumerate() {
-                if (q[i] < lower || q[i] > upper) && self.redundant != Some(i) {
+            for (i, &(lower, upper)) in self.margined.iter().enumerate().filter(|(i, _)| free[*i]) {
+                q[i] = start[i] + scale * step[i];
+                if q[i] < lower || q[i] > upper {
                     stopped = true;
                     q[i] = q[i].clamp(lower, upper);
-                    free.column_mut(i).fill(0.0);
                 }
             }
             if !stopped {
                 return;
             }
-            let held = *q;
-            *q = std::array::from_fn(|i| if free.column(i).amax() == 0.0 { held[i] } else { q[i] });
+            for (i, &(lower, upper)) in self.margined.iter().enumerate() {
+                free[i] &= q[i] > lower && q[i] < upper;
+            }
         }
     }
 
@@ -241,7 +254,7 @@ impl Numeric {
                 q[held] = near[held] + (redundancy - near[held]) * t;
             }
             let before = q;
-            last = Some(self.descend(&pose, &mut q)?);
+            last = Some(self.descend(&pose, &[], &mut q)?);
             if q.iter().zip(&before).any(|(a, b)| (a - b).abs() > NEAR) {
                 return None;
             }
@@ -270,7 +283,7 @@ impl InverseKinematics for Numeric {
             let Some(mut q) = mirrored.pop_front().or_else(|| fresh.next()) else { break };
             let redundancy = self.hold(&mut q, redundancy);
             in_vain += 1;
-            let Some(jacobian) = self.descend(target, &mut q) else { continue };
+            let Some(jacobian) = self.descend(target, out, &mut q) else { continue };
             self.represent(&mut q);
             let signs = self.signs(&q, &jacobian);
             // With two spare joints solutions are not isolated: one for each posture will do.
@@ -317,6 +330,48 @@ impl InverseKinematics for Numeric {
         let redundancy = self.hold(&mut q, redundancy);
         Some(Solution { q, branch, redundancy })
     }
+}
+
+/// Jᵀ (J Jᵀ + λ I)⁻¹ e over the free columns, 0 in the others: the solver's inner loop, by hand
+/// since general matrices took most of its time.
+#[inline]
+fn damped_step(
+    jacobian: &Jacobian,
+    free: &[bool; MAX_DOF],
+    error: &Vector6<f64>,
+    damping: f64,
+) -> JointVector {
+    let columns: &[[f64; 6]; MAX_DOF] = &jacobian.data.0;
+    // The lower triangle of J Jᵀ + λ I, then of its Cholesky factor.
+    let mut l = [[0.0; 6]; 6];
+    for (column, _) in columns.iter().zip(free).filter(|(_, free)| **free) {
+        for i in 0..6 {
+            for j in 0..6 {
+                l[i][j] += column[i] * column[j];
+            }
+        }
+    }
+    let mut inverse = [0.0; 6];
+    let mut x = [0.0; 6];
+    for i in 0..6 {
+        for j in 0..i {
+            let known: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            l[i][j] = (l[i][j] - known) * inverse[j];
+        }
+        let known: f64 = (0..i).map(|k| l[i][k] * l[i][k]).sum();
+        // Rounding may take away all of a singular direction but the damping.
+        inverse[i] = (l[i][i] + damping - known).max(1e-2 * damping).sqrt().recip();
+        let known: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
+        x[i] = (error[i] - known) * inverse[i];
+    }
+    for i in (0..6).rev() {
+        let known: f64 = (i + 1..6).map(|k| l[k][i] * x[k]).sum();
+        x[i] = (x[i] - known) * inverse[i];
+    }
+    std::array::from_fn(|c| match free[c] {
+        true => (0..6).map(|i| columns[c][i] * x[i]).sum(),
+        false => 0.0,
+    })
 }
 
 /// Orders solutions by branch signs and joint values, and counts those with the same signs.
