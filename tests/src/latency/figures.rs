@@ -45,6 +45,49 @@ impl Swaps {
     }
 }
 
+/// A figure beside its target.
+#[derive(Clone, Debug, Serialize)]
+pub struct Target {
+    /// What is compared.
+    pub what: &'static str,
+    /// What was found, in `unit`.
+    pub found: f64,
+    /// What it should not exceed.
+    pub target: f64,
+    /// `×` for a ratio within the same run, else µs or a count.
+    pub unit: &'static str,
+}
+
+impl Target {
+    fn is_met(&self) -> bool {
+        self.found <= self.target
+    }
+}
+
+/// What the executor told of its armed cycles.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Armed {
+    /// Cycles.
+    pub cycles: u64,
+    /// Calls into the system's heap.
+    pub heap_calls: u64,
+    /// Page faults.
+    pub page_faults: u64,
+}
+
+impl Armed {
+    /// Adds what an executor's last words tell.
+    pub(super) fn add(&mut self, told: &str) {
+        // "… armed for N cycles: H system-heap calls, F page faults; …"
+        let Some((_, rest)) = told.rsplit_once("armed for ") else { return };
+        let mut numbers = rest.split(|c: char| !c.is_ascii_digit()).filter(|n| !n.is_empty());
+        let mut next = || numbers.next().and_then(|n| n.parse::<u64>().ok()).unwrap_or(0);
+        self.cycles += next();
+        self.heap_calls += next();
+        self.page_faults += next();
+    }
+}
+
 /// Everything that was measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figures {
@@ -66,8 +109,12 @@ pub struct Figures {
     pub knots: u32,
     /// The distributions.
     pub rows: Vec<Row>,
+    /// Figures beside their targets.
+    pub targets: Vec<Target>,
     /// Deadlines that the executor missed.
     pub missed_cycles: u64,
+    /// The executor's armed cycles.
+    pub armed: Armed,
     /// Changes of plan.
     pub swaps: Swaps,
     /// Violations that the endpoint's judge found.
@@ -95,6 +142,7 @@ pub(super) struct Sums {
     pub(super) swap: Times,
     pub(super) command: Times,
     pub(super) missed: u64,
+    pub(super) armed: Armed,
     pub(super) swaps: Swaps,
     pub(super) violations: u64,
     pub(super) published: usize,
@@ -127,6 +175,34 @@ impl Sums {
             .collect()
     }
 
+    fn targets(&self) -> Vec<Target> {
+        let us = |ns: u64| ns as f64 * 1e-3;
+        let ratio = |a: u64, b: u64| a as f64 / b.max(1) as f64;
+        let target = |what, found, target, unit| Target { what, found, target, unit };
+        let (wake, compute) = (of_buckets(&self.wake), of_buckets(&self.compute));
+        let (sent, bare) = (self.transport.percentiles(), self.bare_one_way.percentiles());
+        let after = self.after_admission.percentiles();
+        let mut targets = Vec::new();
+        if let Some(yardstick) = self.cyclictest.as_ref().map(Times::percentiles) {
+            let p50 = ratio(wake.p50_ns, yardstick.p50_ns);
+            let p99 = ratio(wake.p99_ns, yardstick.p99_ns);
+            targets.push(target("wake-up lateness p50 to cyclictest's", p50, 0.2, "×"));
+            targets.push(target("wake-up lateness p99 to cyclictest's", p99, 1.0, "×"));
+        }
+        let transport = ratio(sent.p50_ns, bare.p50_ns);
+        let swap = self.swap.percentiles();
+        targets.extend([
+            target("compute time p99", us(compute.p99_ns), 5.0, "µs"),
+            target("setpoint transport p50 to the bare loop's", transport, 1.2, "×"),
+            target("plan: publish to first setpoint p99", us(swap.p99_ns), 10_000.0, "µs"),
+            target("plan: after admission p99", us(after.p99_ns), 1000.0 + us(sent.p99_ns), "µs"),
+            target("command to answer p99", us(self.command.percentiles().p99_ns), 1e4, "µs"),
+            target("system-heap calls when armed", self.armed.heap_calls as f64, 0.0, ""),
+            target("page faults when armed", self.armed.page_faults as f64, 0.0, ""),
+        ]);
+        targets
+    }
+
     pub(super) fn figures(&self, args: &Args, load: String) -> Figures {
         Figures {
             kernel: read("/proc/sys/kernel/osrelease"),
@@ -138,7 +214,9 @@ impl Sums {
             seed: args.seed,
             knots: args.knots,
             rows: self.rows(),
+            targets: self.targets(),
             missed_cycles: self.missed,
+            armed: self.armed,
             swaps: self.swaps,
             violations: self.violations,
             plans: (self.published, self.accepted),
@@ -193,11 +271,23 @@ impl Figures {
         for column in table.column_iter_mut().skip(1) {
             column.set_cell_alignment(CellAlignment::Right);
         }
+        let mut targets = Table::new();
+        targets.load_style(presets::UTF8_BORDERS_ONLY);
+        targets.set_header(["target", "found", "at most", ""]);
+        for t in &self.targets {
+            let told = |v: f64| format!("{v:.2} {}", t.unit);
+            let verdict = if t.is_met() { "met" } else { "NOT met" };
+            targets.add_row([t.what.into(), told(t.found), told(t.target), verdict.into()]);
+        }
+        for column in targets.column_iter_mut().skip(1).take(2) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
         let kind = if self.realtime_kernel { "a real-time kernel" } else { "no real-time kernel" };
         let stress = if self.stressed { ", with stress-ng" } else { "" };
         format!(
-            "{table}\nkernel {} ({kind}), {} processors, load {} at the start{stress}, {} s\n\
-             executor histograms are told by the upper bound of their bucket; {} deadlines missed\n\
+            "{table}\n{targets}\nkernel {} ({kind}), {} processors, load {} at the start{stress}, {} s\n\
+             executor histograms are told by the upper bound of their bucket; {} deadlines missed; \
+             armed for {} cycles\n\
              {} plans of {} knots at random moments, {} accepted; {} violations at the endpoint\n\
              {} changes of plan: largest step {:.3} of v·T, largest change of velocity {:.3} rad/s",
             self.kernel,
@@ -205,6 +295,7 @@ impl Figures {
             self.load,
             self.seconds,
             self.missed_cycles,
+            self.armed.cycles,
             self.plans.0,
             self.knots,
             self.plans.1,
@@ -224,4 +315,26 @@ pub(super) fn loadavg() -> String {
 /// A small file of the kernel's, without its line end; empty where it is not there.
 fn read(path: &str) -> String {
     fs::read_to_string(path).map(|text| text.trim_end().to_owned()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_executors_last_words_are_read() {
+        let mut armed = Armed::default();
+        armed.add("12:00 INFO 99 cycles, 1 deadlines missed; armed for 80 cycles: 2 system-heap calls, 3 page faults; 7 blocks");
+        armed.add("nothing of that kind");
+        assert_eq!((armed.cycles, armed.heap_calls, armed.page_faults), (80, 2, 3));
+    }
+
+    #[test]
+    fn what_is_above_its_target_is_not_met() {
+        let mut sums = Sums::default();
+        sums.compute[20] = 1;
+        sums.armed.page_faults = 1;
+        let met: Vec<_> = sums.targets().iter().filter(|t| !t.is_met()).map(|t| t.what).collect();
+        assert_eq!(met, ["compute time p99", "page faults when armed"]);
+    }
 }

@@ -34,7 +34,7 @@ use crate::witness::{PATIENCE, Witness};
 use figures::Sums;
 use load::Load;
 
-pub use figures::{Figures, Row, Swaps};
+pub use figures::{Armed, Figures, Row, Swaps, Target};
 pub use stats::{Percentiles, Times, of_buckets};
 
 /// Length of the plans that are published. \[s\]
@@ -165,6 +165,7 @@ fn measure(
         let published =
             published.with_context(|| format!("executor: {}", executor.stderr().trim_end()))?;
         executor.terminate(PATIENCE)?;
+        sums.armed.add(&executor.stderr());
         sums.transport.merge(&seen.transport);
         sums.inter_arrival.merge(&seen.inter_arrival);
         sums.made_late.merge(&seen.made_late);
