@@ -43,6 +43,12 @@ pub struct Driver<H> {
     /// The newest of them that the endpoint is known to have had.
     heard: u64,
     early: Early,
+    /// Whether the coming cycle was rehearsed.
+    rehearsed: bool,
+    /// Cycles since the last report.
+    unreported: u64,
+    /// When the last cycle was. \[ns\]
+    stamp_ns: u64,
     cycles: u64,
     /// Reads and writes that failed.
     failures: u64,
@@ -72,6 +78,9 @@ impl<H: Hardware> Driver<H> {
             made: [0; MADE],
             heard: 0,
             early: Early::default(),
+            rehearsed: false,
+            unreported: 0,
+            stamp_ns: 0,
             cycles: 0,
             failures: 0,
         }
@@ -116,6 +125,10 @@ impl<H: Hardware> Driver<H> {
     /// millisecond finds them cold. Nothing is commanded; what waits for the cycle is taken out of
     /// its queue and kept.
     pub fn rehearse(&mut self, deadline_ns: u64) {
+        self.rehearsed = true;
+        if self.unreported >= REPORT_EVERY {
+            self.report();
+        }
         self.hardware.prepare();
         self.gather();
         let Early { states, ask, offer } = &self.early;
@@ -190,15 +203,25 @@ impl<H: Hardware> Driver<H> {
         if let Some(reply) = out.reply {
             self.slots.replies.force_push(reply);
         }
-        if self.cycles.is_multiple_of(REPORT_EVERY) {
-            self.slots.reports.force_push(Report {
-                stamp_ns: wake.now_ns,
-                snapshot: self.state.snapshot(),
-                lateness: self.lateness,
-                compute: self.compute,
-                round_trip: self.round_trip,
-            });
+        self.unreported += 1;
+        self.stamp_ns = wake.now_ns;
+        // A loop that rehearses has the time for it then.
+        if self.unreported >= REPORT_EVERY && !self.rehearsed {
+            self.report();
         }
+        self.rehearsed = false;
+    }
+
+    /// Tells the state after the last cycle.
+    fn report(&mut self) {
+        self.unreported = 0;
+        self.slots.reports.force_push(Report {
+            stamp_ns: self.stamp_ns,
+            snapshot: self.state.snapshot(),
+            lateness: self.lateness,
+            compute: self.compute,
+            round_trip: self.round_trip,
+        });
     }
 
     /// Counts a wake-up and how long its cycle took, with the lateness of each deadline that was

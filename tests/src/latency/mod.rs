@@ -19,6 +19,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::Parser;
+use nullsweep_executor::rt;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::{CommandKind, EventKind, HISTOGRAM_BUCKETS, Mode, PlanEvent};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, MAX_DOF, Robot, Side};
@@ -43,6 +44,8 @@ const PLAN_SECONDS: f64 = 0.04;
 const PLAN_ANGLE: f64 = 0.005;
 /// How the bare loop waits: as the executor does by default. \[ns\]
 const SPIN_NS: u64 = 75_000;
+/// Highest SCHED_FIFO priority of the thread that publishes and commands.
+const PUBLISHER: u8 = 5;
 /// Time between two plans: a rest that lets the last one end, and a random part that spreads the
 /// moment over the executor's cycle. \[ns\]
 const REST_NS: u64 = 180_000_000;
@@ -159,11 +162,20 @@ fn measure(
     thread::scope(|scope| {
         let endpoint =
             scope.spawn(|| station::run(arm, stage.robot(), &root, below(args.priority), &done));
-        let published = publish(args, arm, stage, &mut executor, time, random, sums);
+        // In a thread of its own, as children inherit what it is given.
+        let published = thread::scope(|scope| {
+            let publishing = scope.spawn(|| {
+                // How long an ordinary thread waits for a processor is not the executor's affair.
+                rt::raise(args.priority.min(PUBLISHER));
+                publish(args, arm, stage, &mut executor, time, random, sums)
+            });
+            publishing.join()
+        });
         done.store(true, Ordering::Relaxed);
         let seen = endpoint.join().map_err(|_| anyhow::anyhow!("the endpoint's thread died"))??;
-        let published =
-            published.with_context(|| format!("executor: {}", executor.stderr().trim_end()))?;
+        let published = published
+            .map_err(|_| anyhow::anyhow!("the publishing thread died"))?
+            .with_context(|| format!("executor: {}", executor.stderr().trim_end()))?;
         executor.terminate(PATIENCE)?;
         sums.armed.add(&executor.stderr());
         sums.transport.merge(&seen.transport);
