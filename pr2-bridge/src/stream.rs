@@ -18,6 +18,9 @@ pub type Joints = [f64; DOF];
 const REMEMBERED: usize = 512;
 /// Points of a message lie at least this far apart. \[ns\]
 const SPACING_NS: u64 = 4_000_000;
+/// A message begins so much before the last one's setpoints end: a moment later, as rounding may
+/// make it, the controller would take the velocity there as 0. \[ns\]
+const EARLY_NS: u64 = 10_000;
 /// A stop takes at least this long. \[s\]
 const SHORTEST_STOP: f64 = 0.02;
 
@@ -160,7 +163,7 @@ impl Stream {
     pub fn message(&mut self, now_ns: u64) -> Option<Message> {
         let from = self.sent_ns?;
         let (last_ns, last_q, last_v) = *self.waiting.back()?;
-        let start_ns = from + self.rules.delay_ns;
+        let start_ns = (from + self.rules.delay_ns).saturating_sub(EARLY_NS);
         if start_ns <= now_ns {
             // Too late to splice: the arm is already slowing down on the last message. A stamp in
             // the past would make it jump.
@@ -178,14 +181,14 @@ impl Stream {
         let mut before = from;
         for &(deadline, q, v) in &self.waiting {
             if deadline >= before + SPACING_NS || deadline == last_ns {
-                points.push(Point { after_ns: deadline.saturating_sub(from).max(1), q, v });
+                points.push(Point { after_ns: deadline.saturating_sub(from) + EARLY_NS, q, v });
                 before = deadline;
             }
         }
         let fastest = last_v.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let stop = (fastest / self.rules.stop_acceleration).max(SHORTEST_STOP);
         let rest: Joints = std::array::from_fn(|j| last_q[j] + 0.5 * stop * last_v[j]);
-        let after_ns = last_ns.saturating_sub(from).max(1) + (stop * 1e9) as u64;
+        let after_ns = last_ns.saturating_sub(from) + EARLY_NS + (stop * 1e9) as u64;
         points.push(Point { after_ns, q: rest, v: [0.0; DOF] });
         self.waiting.clear();
         self.sent_ns = Some(last_ns);
@@ -232,8 +235,8 @@ mod tests {
         for pair in messages.windows(2) {
             let (a, b) = (&pair[0], &pair[1]);
             let joint = a.points[a.points.len() - 2];
-            // The next one begins where the last setpoint of this one is due.
-            assert_eq!(b.start_ns, a.start_ns + joint.after_ns);
+            // The next one begins just before the last setpoint of this one is due.
+            assert_eq!(b.start_ns + EARLY_NS, a.start_ns + joint.after_ns);
             assert_eq!(joint.v[0], 1.0);
         }
         for message in &messages {

@@ -107,7 +107,7 @@ class Segment:
 
     def sample(self, now):
         h = self.end - self.start
-        if now >= self.end or h <= 0:
+        if now > self.end or h <= 0:
             # Past the last segment the arm holds.
             return list(self.q1), [0.0] * len(self.q1)
         u = max(0.0, (now - self.start) / h)
