@@ -18,7 +18,7 @@ const LINE_TOLERANCE: f64 = 1.5e-4;
 const CHORD: f64 = 2e-4;
 
 /// The same path as `plan` (which must be of [`Profile::Velocity`]), its corners blended within
-/// [`LINE_TOLERANCE`] on the surface and clear of collision everywhere, as fast as the limits
+/// `LINE_TOLERANCE` on the surface and clear of collision everywhere, as fast as the limits
 /// allow. In the corners at the knots `stops`, and where no blend fits, the arm comes to rest.
 #[must_use]
 pub fn accelerate(plan: &Plan, cell: Workcell<'_>, limits: &Limits, stops: &[usize]) -> Plan {
