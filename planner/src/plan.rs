@@ -7,7 +7,7 @@ use nullsweep_ipc_types::{
     Contact, Interpolation, Knot, MAX_HELD_JOINTS, MAX_JOINTS, MAX_KNOTS, PlanHeader, PlanMessage,
     checksum,
 };
-use nullsweep_robot::{JointVector, MAX_DOF};
+use nullsweep_robot::{Arm, JointVector, MAX_DOF};
 use serde::{Deserialize, Serialize};
 
 use crate::cost::CostKind;
@@ -64,6 +64,15 @@ pub struct Held {
     pub name: String,
     /// Where it stands. \[rad\] or \[m\]
     pub position: f64,
+}
+
+impl Held {
+    /// Every held joint of an arm, in the order of its URDF.
+    #[must_use]
+    pub fn all_of(arm: &Arm) -> Vec<Self> {
+        let held = arm.held_joints().iter();
+        held.map(|h| Self { name: h.name.clone(), position: h.position }).collect()
+    }
 }
 
 /// A scanned point with what is known of it.

@@ -282,11 +282,7 @@ impl Shop<'_> {
             robot: robot.name().into(),
             fingerprint: arm.fingerprint(),
             joints: arm.joint_names().to_vec(),
-            held: arm
-                .held_joints()
-                .iter()
-                .map(|h| Held { name: h.name.clone(), position: h.position })
-                .collect(),
+            held: Held::all_of(arm),
             tool: job.tool.clone(),
             base: stance.base,
             method: job.method,

@@ -273,11 +273,7 @@ fn assemble(
         robot: robot.name().into(),
         fingerprint: arm.fingerprint(),
         joints: arm.joint_names().to_vec(),
-        held: arm
-            .held_joints()
-            .iter()
-            .map(|h| Held { name: h.name.clone(), position: h.position })
-            .collect(),
+        held: Held::all_of(arm),
         tool: config.tool.clone(),
         base: [0.0; 3],
         method: Method::Tsp,

@@ -39,11 +39,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         robot: "pr2".into(),
         fingerprint: arm.fingerprint(),
         joints: arm.joint_names().to_vec(),
-        held: arm
-            .held_joints()
-            .iter()
-            .map(|h| Held { name: h.name.clone(), position: h.position })
-            .collect(),
+        held: Held::all_of(arm),
         tool,
         base: [0.0; 3],
         method: Method::Tsp,
