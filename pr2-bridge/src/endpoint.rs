@@ -24,6 +24,8 @@ const OLD_NS: u64 = 500_000_000;
 const SILENT_NS: u64 = 3_000_000_000;
 /// The master counts as lost so long after it was last reached. \[ns\]
 const MASTER_NS: u64 = 2_000_000_000;
+/// `/joint_states` comes at 100 Hz; after so long without a usable one it counts as lost. \[ns\]
+const UNHEARD_NS: u64 = 200_000_000;
 /// Time between two looks. The executor's setpoints wait in their buffer meanwhile.
 const ROUND: Duration = Duration::from_micros(500);
 
@@ -40,6 +42,7 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     let names = Names {
         controller: args.controller(),
         calibrated: (!args.assume_calibrated).then(|| args.calibrated.clone()),
+        goals: args.whole_plan,
     };
     // Before the ROS side's threads are made, which inherit it. Where it is denied messages are
     // only later now and then.
@@ -63,15 +66,15 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     let mut told = Told::default();
     let mut due_ns = now_ns();
     let mut disabled = false;
-    let mut ceased = false;
+    let mut stopped = false;
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
-        let health = health(&link, now_ns());
+        let health = health(&link, &ear, now_ns());
         told.tell(health, &link);
         while let Ok(News::Joints(message, at_ns)) = link.news.try_recv() {
             let Some(mut state) = ear.hear(&message, at_ns) else { continue };
             state.status = health.status;
-            if ceased {
+            if stopped {
                 state.status |= status::SETPOINT_TIMEOUT;
             }
             if let Some((sequence, deadline)) = stream.in_force(state.stamp_ns) {
@@ -98,16 +101,18 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
             stream.let_go();
         }
         let now = now_ns();
-        ceased = stream.has_ceased(now);
+        let before = std::mem::replace(&mut stopped, stream.has_stopped(now));
+        if stopped && !before {
+            tracing::warn!(
+                "setpoints have ceased, or a message would come too late (is --delay too short?): \
+                 the arm comes to rest"
+            );
+        }
         if now >= due_ns {
             due_ns = now.max(due_ns + args.period * 1_000_000);
-            let late = stream.late;
             if let Some(message) = stream.message(now) {
                 let order = Order::Command(trajectory(&message, arm.joint_names()));
                 link.orders.send(order).context("the ROS side ended")?;
-            }
-            if stream.late > late {
-                tracing::warn!("a message came too late, the arm stops: is --delay too short?");
             }
         }
     }
@@ -132,7 +137,7 @@ fn whole_plans(
     let mut told = Told::default();
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(Duration::from_millis(2));
-        let health = health(link, now_ns());
+        let health = health(link, ear, now_ns());
         told.tell(health, link);
         while let Ok(news) = link.news.try_recv() {
             match news {
@@ -144,7 +149,7 @@ fn whole_plans(
                 News::Result(result) => whole.ended(&result)?,
             }
         }
-        let ready = health.is_linked && health.status == status::CALIBRATED;
+        let ready = health.is_linked && health.hears && health.status == status::CALIBRATED;
         whole.round(ready, link)?;
     }
     whole.close()
@@ -157,9 +162,11 @@ struct Health {
     /// Whether master and controller are there.
     is_linked: bool,
     has_master: bool,
+    /// Whether joint states come that can be used.
+    hears: bool,
 }
 
-fn health(link: &Link, now: u64) -> Health {
+fn health(link: &Link, ear: &Ear, now: u64) -> Health {
     let known = &link.known;
     let silent = now.saturating_sub(known.halted_ns.load(Ordering::Relaxed)) > SILENT_NS;
     let mut bits = 0;
@@ -171,7 +178,8 @@ fn health(link: &Link, now: u64) -> Health {
     }
     let has_master = now.saturating_sub(known.master_ns.load(Ordering::Relaxed)) <= MASTER_NS;
     let is_linked = has_master && known.controller.load(Ordering::Relaxed);
-    Health { status: bits, is_linked, has_master }
+    let hears = now.saturating_sub(ear.heard_ns) <= UNHEARD_NS;
+    Health { status: bits, is_linked, has_master, hears }
 }
 
 /// Says what changed.
@@ -187,6 +195,8 @@ impl Told {
             tracing::error!("the ROS master is gone: no state is passed on, the arm stops");
         } else if !health.is_linked {
             tracing::error!("the arm's controller does not listen: no state is passed on");
+        } else if !health.hears {
+            tracing::error!("/joint_states is silent: no state is passed on, the arm stops");
         } else if health.status & status::CALIBRATED == 0 {
             tracing::warn!("the joints are not calibrated");
         } else if health.status & status::HALTED != 0 {
@@ -204,6 +214,8 @@ struct Ear {
     names: Vec<String>,
     held: Vec<String>,
     measured: Option<Joints>,
+    /// When the last usable one came. \[ns\]
+    heard_ns: u64,
     sequence: u64,
     warned: bool,
 }
@@ -214,6 +226,7 @@ impl Ear {
             names: arm.joint_names().to_vec(),
             held: arm.held_joints().iter().map(|h| h.name.clone()).collect(),
             measured: None,
+            heard_ns: 0,
             sequence: 0,
             warned: false,
         }
@@ -266,6 +279,7 @@ impl Ear {
         for (h, name) in self.held.iter().enumerate() {
             state.held_positions[h] = find(name)?.1;
         }
+        self.heard_ns = at_ns;
         self.sequence += 1;
         state.sequence = self.sequence;
         state.stamp_ns = stamp_ns;
@@ -291,10 +305,14 @@ pub fn point(
     v: Option<&Joints>,
     after_ns: u64,
 ) -> trajectory_msgs::JointTrajectoryPoint {
-    let mut out = trajectory_msgs::JointTrajectoryPoint::default();
-    out.positions = q.to_vec();
-    out.velocities = v.map_or_else(Vec::new, |v| v.to_vec());
-    out.time_from_start.sec = (after_ns / 1_000_000_000) as i32;
-    out.time_from_start.nsec = (after_ns % 1_000_000_000) as i32;
-    out
+    let time_from_start = roslibrust::codegen::integral_types::Duration {
+        sec: (after_ns / 1_000_000_000) as i32,
+        nsec: (after_ns % 1_000_000_000) as i32,
+    };
+    trajectory_msgs::JointTrajectoryPoint {
+        positions: q.to_vec(),
+        velocities: v.map_or_else(Vec::new, |v| v.to_vec()),
+        time_from_start,
+        ..Default::default()
+    }
 }

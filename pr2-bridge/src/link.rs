@@ -95,6 +95,8 @@ pub struct Names {
     pub controller: String,
     /// Where calibration is told; `None`: it is taken for granted.
     pub calibrated: Option<String>,
+    /// Whether the controller takes goals, not commands.
+    pub goals: bool,
 }
 
 /// How often the master is looked for.
@@ -131,7 +133,7 @@ pub fn call(common: &Common, service: Service) -> anyhow::Result<()> {
 
 /// ROS time of a moment on `CLOCK_MONOTONIC`.
 pub fn ros_time(at_ns: u64) -> roslibrust::codegen::integral_types::Time {
-    let total = wall_ns() + i128::from(at_ns) - i128::from(now_ns());
+    let total = i128::from(at_ns) + wall_ahead_ns();
     roslibrust::codegen::integral_types::Time {
         secs: (total / 1_000_000_000) as i32,
         nsecs: (total % 1_000_000_000) as i32,
@@ -141,11 +143,26 @@ pub fn ros_time(at_ns: u64) -> roslibrust::codegen::integral_types::Time {
 /// The moment on `CLOCK_MONOTONIC` of a ROS time, 0 for one before the machine started. \[ns\]
 pub fn moment(time: &roslibrust::codegen::integral_types::Time) -> u64 {
     let stamp = i128::from(time.secs) * 1_000_000_000 + i128::from(time.nsecs);
-    u64::try_from(i128::from(now_ns()) + stamp - wall_ns()).unwrap_or(0)
+    u64::try_from(stamp - wall_ahead_ns()).unwrap_or(0)
 }
 
-fn wall_ns() -> i128 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as i128)
+/// How far the wall clock is ahead of `CLOCK_MONOTONIC`. A thread that is interrupted between the
+/// two readings would shift a stamp by that long, so they are taken again until they were close.
+fn wall_ahead_ns() -> i128 {
+    let read = || {
+        let before = now_ns();
+        let wall = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos());
+        let took = now_ns() - before;
+        (took, wall as i128 - i128::from(before + took / 2))
+    };
+    let mut best = read();
+    for _ in 0..20 {
+        if best.0 < 1_000 {
+            break;
+        }
+        best = best.min(read());
+    }
+    best.1
 }
 
 fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
@@ -221,14 +238,18 @@ async fn start(
     let goal =
         node.advertise::<control_msgs::FollowJointTrajectoryActionGoal>(&topic, 5, false).await?;
     let own = Arc::clone(&known);
-    let driver = common.driver.clone();
+    let (driver, goals) = (common.driver.clone(), names.goals);
     tokio::spawn(async move {
         let mut look = tokio::time::interval(Duration::from_millis(20));
         loop {
             let order = tokio::select! {
                 order = orders.recv() => order,
                 _ = look.tick() => {
-                    let listens = command.has_connected_clients() || goal.has_connected_clients();
+                    let listens = if goals {
+                        goal.has_connected_clients()
+                    } else {
+                        command.has_connected_clients()
+                    };
                     own.controller.store(listens, Ordering::Relaxed);
                     continue;
                 }

@@ -3,9 +3,11 @@
 
 mod endpoint;
 mod link;
+mod playout;
 mod stream;
 mod whole;
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -129,7 +131,12 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| "pr2_bridge=info,warn".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let colours = std::io::stderr().is_terminal();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(colours)
+        .with_writer(std::io::stderr)
+        .init();
     let result = match &cli.command {
         Command::Run(args) => endpoint::run(&cli.common, args),
         Command::Reset => link::call(&cli.common, link::Service::Reset),

@@ -1,13 +1,15 @@
 //! Setpoints at 1 kHz to short trajectories for the controller. No clock, no ROS: a test runs it.
 //!
 //! Each message holds the setpoints since the last one, to be followed `delay` after they were
-//! due, and ends in a stop: when messages cease, the arm slows down and holds by itself. The next
-//! message's stamp is where the last one's setpoints end, so that the controller splices it there
-//! and drops the stop.
+//! due (see [`Playout`]), and ends in a stop: when messages cease, the arm slows down and holds by
+//! itself. The next message's stamp is where the last one's setpoints end, so that the controller
+//! splices it there and drops the stop.
 
 use std::collections::VecDeque;
 
 use nullsweep_ipc_types::{Mode, Setpoint};
+
+use crate::playout::Playout;
 
 /// Joints of the arm.
 pub const DOF: usize = 7;
@@ -23,6 +25,11 @@ const SPACING_NS: u64 = 4_000_000;
 const EARLY_NS: u64 = 10_000;
 /// A stop takes at least this long. \[s\]
 const SHORTEST_STOP: f64 = 0.02;
+/// What a message's way to the controller may take. \[ns\]
+const WAY_NS: u64 = 5_000_000;
+/// Where the arm is asked to be when it begins to follow differs a little from where the first
+/// setpoint is; so long it takes until that difference is gone. \[s\]
+const FADE: f64 = 0.5;
 
 /// How a stream works.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,19 +66,44 @@ pub struct Message {
     pub points: Vec<Point>,
 }
 
+/// A setpoint that is not sent yet.
+#[derive(Clone, Copy, Debug)]
+struct Due {
+    /// When it is followed. \[ns\]
+    at_ns: u64,
+    q: Joints,
+    v: Joints,
+}
+
+/// What is being followed.
+#[derive(Clone, Debug)]
+struct Following {
+    playout: Playout,
+    /// Up to where setpoints were sent. \[ns\]
+    sent_ns: u64,
+    /// The last setpoint.
+    last: (Joints, Joints),
+    /// When following began, and how far the controller's own setpoint was from the first one.
+    began_ns: u64,
+    offset: Joints,
+}
+
 /// The stream's memory.
 #[derive(Clone, Debug)]
 pub struct Stream {
     rules: Rules,
-    /// Setpoints that are not sent yet, as deadline, position and velocity.
-    waiting: VecDeque<(u64, Joints, Joints)>,
-    /// Sequence and deadline of those that were received.
-    known: VecDeque<(u64, u64)>,
-    /// Up to where setpoints were sent. \[ns\]
-    sent_ns: Option<u64>,
-    /// The last position that was sent, at rest.
-    rests_at: Option<Joints>,
+    following: Option<Following>,
+    waiting: VecDeque<Due>,
+    /// Sequence and deadline of those that were received, and when they are followed.
+    known: VecDeque<(u64, u64, u64)>,
+    /// Where and when the last message comes to rest.
+    rest: Option<(Joints, u64)>,
+    /// Whether the last message stands still where it ends.
+    stands: bool,
+    /// Whether following ended because setpoints ceased or came too late.
+    stopped: bool,
     last_deadline_ns: Option<u64>,
+    last_sequence: u64,
     /// Messages made.
     made: u32,
     /// Messages that could not be sent in time.
@@ -85,11 +117,14 @@ impl Stream {
     pub fn new(rules: Rules) -> Self {
         Self {
             rules,
+            following: None,
             waiting: VecDeque::new(),
             known: VecDeque::with_capacity(REMEMBERED),
-            sent_ns: None,
-            rests_at: None,
+            rest: None,
+            stands: false,
+            stopped: false,
             last_deadline_ns: None,
+            last_sequence: 0,
             made: 0,
             late: 0,
             refused: 0,
@@ -107,92 +142,141 @@ impl Stream {
             self.refused += 1;
             return;
         }
-        self.last_deadline_ns = Some(setpoint.deadline_ns);
+        let (sequence, deadline_ns) = (setpoint.sequence, setpoint.deadline_ns);
+        if sequence <= self.last_sequence {
+            // Another executor, which counts from 1 again.
+            self.stop();
+        }
+        self.last_deadline_ns = Some(deadline_ns);
+        self.last_sequence = sequence;
+        if setpoint.disable != 0 {
+            self.let_go();
+        } else if self.following.is_some() {
+            self.follow(sequence, deadline_ns, q, v);
+        } else {
+            self.begin(setpoint, &q, measured);
+        }
+        let at_ns = self.following.as_ref().map(|f| f.playout.at_ns());
         if self.known.len() == REMEMBERED {
             self.known.pop_front();
         }
-        self.known.push_back((setpoint.sequence, setpoint.deadline_ns));
-        if setpoint.disable != 0 {
-            self.let_go();
-            return;
-        }
-        if self.sent_ns.is_none() {
-            // While the arm follows nothing, the executor's setpoints follow the arm.
-            let far = (0..DOF).any(|j| (q[j] - measured[j]).abs() > self.rules.start_tolerance);
-            if far || setpoint.mode == Mode::Fault.wire() || setpoint.mode == Mode::Init.wire() {
-                self.refused += u64::from(far);
-                return;
-            }
-            self.sent_ns = Some(setpoint.deadline_ns);
-            self.rests_at = None;
-        }
-        self.waiting.push_back((setpoint.deadline_ns, q, v));
+        let at_ns = at_ns.unwrap_or(deadline_ns + self.rules.delay_ns);
+        self.known.push_back((sequence, deadline_ns, at_ns));
     }
 
-    /// Forgets what the arm was to do: it follows again only what begins where it is.
+    /// Begins to follow with this setpoint, if it is where the arm is, which has come to rest.
+    /// While the arm follows nothing, the executor's setpoints follow the arm.
+    fn begin(&mut self, setpoint: &Setpoint, q: &Joints, measured: &Joints) {
+        let far = (0..DOF).any(|j| (q[j] - measured[j]).abs() > self.rules.start_tolerance);
+        self.refused += u64::from(far);
+        let playout = Playout::begin(self.rules.delay_ns, setpoint.sequence, setpoint.deadline_ns);
+        let moves = self.rest.is_some_and(|(_, at_ns)| at_ns > playout.at_ns());
+        let mode = setpoint.mode;
+        if far || moves || mode == Mode::Fault.wire() || mode == Mode::Init.wire() {
+            return;
+        }
+        // The controller goes on from its own setpoint, not from where the arm is.
+        let from = self.rest.map_or(*measured, |(rest, _)| rest);
+        let at_ns = playout.at_ns();
+        self.waiting.push_back(Due { at_ns, q: from, v: [0.0; DOF] });
+        self.following = Some(Following {
+            playout,
+            sent_ns: at_ns,
+            began_ns: at_ns,
+            last: (*q, [0.0; DOF]),
+            offset: std::array::from_fn(|j| from[j] - q[j]),
+        });
+        self.stopped = false;
+        self.stands = false;
+    }
+
+    fn follow(&mut self, sequence: u64, deadline_ns: u64, q: Joints, v: Joints) {
+        let Some(f) = &mut self.following else { return };
+        let still = v == [0.0; DOF] && f.last == (q, v);
+        f.last = (q, v);
+        f.playout.advance(sequence, deadline_ns, still);
+        let (at_ns, pace) = (f.playout.at_ns(), f.playout.pace());
+        let u = ((at_ns - f.began_ns) as f64 * 1e-9 / FADE).min(1.0);
+        let (fade, slope) = (1.0 - u * u * (3.0 - 2.0 * u), -6.0 * u * (1.0 - u) / FADE);
+        self.waiting.push_back(Due {
+            at_ns,
+            q: std::array::from_fn(|j| q[j] + fade * f.offset[j]),
+            v: std::array::from_fn(|j| v[j] * pace + slope * f.offset[j]),
+        });
+    }
+
+    /// Forgets what the arm was to do, because its motors are off: it follows again only what
+    /// begins where it is.
     pub fn let_go(&mut self) {
         self.waiting.clear();
-        self.sent_ns = None;
-        self.rests_at = None;
+        self.following = None;
+        self.rest = None;
+    }
+
+    /// Follows no longer: the arm is on its way to rest on the last message.
+    fn stop(&mut self) {
+        self.waiting.clear();
+        self.stopped |= self.following.take().is_some();
     }
 
     /// Whether setpoints are being followed.
     #[cfg(test)]
     pub fn follows(&self) -> bool {
-        self.sent_ns.is_some()
+        self.following.is_some()
     }
 
-    /// Whether setpoints have ceased; then the arm is on its way to rest on the last message.
-    pub fn has_ceased(&mut self, now_ns: u64) -> bool {
+    /// Whether setpoints have ceased or came too late; then the arm is on its way to rest on the
+    /// last message, or rests there, until it follows again.
+    pub fn has_stopped(&mut self, now_ns: u64) -> bool {
         let ceased = self
             .last_deadline_ns
             .is_some_and(|last| now_ns > last.saturating_add(self.rules.timeout_ns));
         if ceased && self.waiting.is_empty() {
-            self.let_go();
+            self.stop();
         }
-        ceased
+        ceased || self.stopped
     }
 
     /// The newest setpoint that was in force at a moment, with its deadline.
     pub fn in_force(&self, at_ns: u64) -> Option<(u64, u64)> {
-        let due = at_ns.checked_sub(self.rules.delay_ns)?;
-        self.known.iter().rev().find(|(_, deadline)| *deadline <= due).copied()
+        let (sequence, deadline, _) = self.known.iter().rev().find(|(_, _, at)| *at <= at_ns)?;
+        Some((*sequence, *deadline))
     }
 
     /// The next message; `None` where nothing is to be sent.
     pub fn message(&mut self, now_ns: u64) -> Option<Message> {
-        let from = self.sent_ns?;
-        let (last_ns, last_q, last_v) = *self.waiting.back()?;
-        let start_ns = (from + self.rules.delay_ns).saturating_sub(EARLY_NS);
-        if start_ns <= now_ns {
+        let f = self.following.as_mut()?;
+        let last = *self.waiting.back()?;
+        let from = f.sent_ns;
+        let start_ns = from.saturating_sub(EARLY_NS);
+        if start_ns <= now_ns + WAY_NS {
             // Too late to splice: the arm is already slowing down on the last message. A stamp in
             // the past would make it jump.
             self.late += 1;
-            self.let_go();
+            self.stop();
             return None;
         }
-        let stands = last_v == [0.0; DOF] && self.waiting.iter().all(|(_, q, _)| *q == last_q);
-        if stands && self.rests_at == Some(last_q) {
+        f.sent_ns = last.at_ns;
+        let stands = last.v == [0.0; DOF] && self.waiting.iter().all(|due| due.q == last.q);
+        if stands && self.stands && self.rest.is_some_and(|(rest, _)| rest == last.q) {
             self.waiting.clear();
-            self.sent_ns = Some(last_ns);
             return None;
         }
         let mut points = Vec::with_capacity(self.waiting.len() / 4 + 2);
         let mut before = from;
-        for &(deadline, q, v) in &self.waiting {
-            if deadline >= before + SPACING_NS || deadline == last_ns {
-                points.push(Point { after_ns: deadline.saturating_sub(from) + EARLY_NS, q, v });
-                before = deadline;
+        for due in self.waiting.drain(..) {
+            if due.at_ns >= before + SPACING_NS || due.at_ns == last.at_ns {
+                points.push(Point { after_ns: due.at_ns - start_ns, q: due.q, v: due.v });
+                before = due.at_ns;
             }
         }
-        let fastest = last_v.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        let fastest = last.v.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let stop = (fastest / self.rules.stop_acceleration).max(SHORTEST_STOP);
-        let rest: Joints = std::array::from_fn(|j| last_q[j] + 0.5 * stop * last_v[j]);
-        let after_ns = last_ns.saturating_sub(from) + EARLY_NS + (stop * 1e9) as u64;
-        points.push(Point { after_ns, q: rest, v: [0.0; DOF] });
-        self.waiting.clear();
-        self.sent_ns = Some(last_ns);
-        self.rests_at = (fastest == 0.0).then_some(last_q);
+        let rest: Joints = std::array::from_fn(|j| last.q[j] + 0.5 * stop * last.v[j]);
+        let rest_ns = last.at_ns + (stop * 1e9) as u64;
+        points.push(Point { after_ns: rest_ns - start_ns, q: rest, v: [0.0; DOF] });
+        self.rest = Some((rest, rest_ns));
+        self.stands = fastest == 0.0;
         self.made += 1;
         Some(Message { sequence: self.made, start_ns, points })
     }
@@ -226,7 +310,8 @@ mod tests {
         let mut stream = Stream::new(RULES);
         let mut messages = Vec::new();
         for k in 1..=100u64 {
-            stream.take(&setpoint(k, 1e-3 * k as f64, 1.0), &[0.0; DOF]);
+            let s = setpoint(k, 1e-3 * k as f64, 1.0);
+            stream.take(&s, &std::array::from_fn(|j| s.positions[j]));
             if k % 20 == 0 {
                 messages.extend(stream.message(1000 * MS + k * MS));
             }
@@ -267,6 +352,98 @@ mod tests {
         assert!(!stream.follows());
     }
 
+    /// The controller's part: at its stamp a message takes over, from the desired state there.
+    struct Controller {
+        segments: Vec<(u64, u64, [[f64; 2]; 2])>,
+    }
+
+    impl Controller {
+        fn at(&self, now: u64) -> [f64; 2] {
+            let Some(&(start, end, [[q0, v0], [q1, v1]])) =
+                self.segments.iter().rev().find(|s| s.0 <= now)
+            else {
+                return [0.0; 2];
+            };
+            if now > end {
+                return [q1, 0.0];
+            }
+            let h = (end - start) as f64 * 1e-9;
+            let u = (now - start) as f64 / (end - start) as f64;
+            let (d, a, b) = (q1 - q0, v0 * h, v1 * h);
+            let (c2, c3) = (3.0 * d - 2.0 * a - b, a + b - 2.0 * d);
+            [q0 + u * (a + u * (c2 + u * c3)), (a + u * (2.0 * c2 + 3.0 * u * c3)) / h]
+        }
+
+        fn take(&mut self, message: &Message) {
+            let mut from = (message.start_ns, self.at(message.start_ns));
+            self.segments.retain(|s| s.0 < message.start_ns);
+            for point in &message.points {
+                let to = (message.start_ns + point.after_ns, [point.q[0], point.v[0]]);
+                self.segments.push((from.0, to.0, [from.1, to.1]));
+                from = to;
+            }
+        }
+    }
+
+    #[test]
+    fn missed_deadlines_are_no_jump() {
+        for missed in [0, 1, 5, 20] {
+            let mut stream = Stream::new(RULES);
+            let mut controller = Controller { segments: Vec::new() };
+            let (mut deadline, mut q, mut speed) = (1000 * MS, 0.005, 0.0);
+            let mut steepest: f64 = 0.0;
+            let mut before = [0.0; 2];
+            for k in 1..=4000u64 {
+                // It speeds up to 0.5 rad/s at 1 rad/s², and the executor stalls every 0.4 s.
+                let stall = if k % 400 == 0 { missed } else { 0 };
+                for _ in 0..=stall {
+                    deadline += MS;
+                    if deadline % (20 * MS) == 0 {
+                        stream.message(deadline).iter().for_each(|m| controller.take(m));
+                    }
+                    let at = controller.at(deadline);
+                    steepest = steepest.max((at[1] - before[1]).abs() / 1e-3);
+                    before = at;
+                }
+                if k > 700 {
+                    speed = f64::min(speed + 1e-3, 0.5);
+                    q += speed * 1e-3;
+                }
+                let mut s = setpoint(k, q, speed);
+                s.deadline_ns = deadline + MS;
+                // The arm stands a little beside the first setpoint.
+                stream.take(&s, &[0.0; DOF]);
+            }
+            assert_eq!(stream.late, 0);
+            assert!((q - before[0]).abs() < 0.05 && (before[1] - 0.5).abs() < 0.2, "{before:?}");
+            assert!(steepest < 2.5, "{missed} missed: {steepest} rad/s²");
+        }
+    }
+
+    #[test]
+    fn what_came_too_late_is_told_until_it_follows_again() {
+        let mut stream = Stream::new(RULES);
+        let mut measured = [0.0; DOF];
+        for k in 1..=20 {
+            stream.take(&setpoint(k, 1e-3 * k as f64, 1.0), &measured);
+        }
+        let message = stream.message(1020 * MS).expect("one");
+        let rest_ns = message.start_ns + message.points.last().expect("one").after_ns;
+        stream.take(&setpoint(21, 0.021, 1.0), &measured);
+        assert_eq!(stream.message(1090 * MS), None);
+        assert!(stream.late == 1 && stream.has_stopped(1021 * MS));
+        // The executor follows the arm, which has not come to rest: not yet.
+        measured[0] = 0.1;
+        stream.take(&setpoint(100, 0.1, 0.0), &measured);
+        assert!(!stream.follows() && stream.has_stopped(1100 * MS));
+        let k = (rest_ns - 60 * MS) / MS - 1000 + 1;
+        stream.take(&setpoint(k, 0.14, 0.0), &[0.14; DOF].map(|q| q * measured[0].signum()));
+        assert!(!stream.follows(), "the other joints are far");
+        measured[0] = 0.14;
+        stream.take(&setpoint(k + 1, 0.14, 0.0), &measured);
+        assert!(stream.follows() && !stream.has_stopped((1001 + k) * MS));
+    }
+
     #[test]
     fn standing_still_sends_one_message_and_ceasing_lets_go() {
         let mut stream = Stream::new(RULES);
@@ -278,7 +455,7 @@ mod tests {
             }
         }
         assert_eq!(count, 1);
-        assert!(!stream.has_ceased(1120 * MS) && stream.follows());
-        assert!(stream.has_ceased(1121 * MS) && !stream.follows());
+        assert!(!stream.has_stopped(1120 * MS) && stream.follows());
+        assert!(stream.has_stopped(1121 * MS) && !stream.follows());
     }
 }
