@@ -10,6 +10,10 @@ holds at the measured position. Topics preempt goals. Joint states go out at 100
 The arm follows the desired position with a lag of the first order. At its end the node writes
 what it saw as JSON: messages, late stamps, the largest steps of the desired position and velocity,
 and the measured positions.
+
+Lines on its standard input play what can go wrong: `mute` and `speak` (joint states cease and come
+again), `old` (their stamps are 0.6 s old), `halt` and `run` (a run stop takes the motors' power and
+gives it back, as the driver tells it), `deaf` (the controller no longer listens).
 """
 
 import argparse
@@ -137,10 +141,18 @@ class Arm:
         self.goal = None
         self.goal_end = 0.0
         self.halted = False
+        self.mute, self.age = False, 0.0
         self.seen = {"messages": 0, "goals": 0, "preempted": 0, "late": 0, "dropped": 0,
                      "lost": 0, "step": 0.0, "velocity_step": 0.0, "largest_error": 0.0}
         self.sequence = None
         self.hold()
+
+    def halt(self, halted):
+        """Motors off or on; then the controller is started again and holds where the arm is."""
+        with self.lock:
+            self.halted = halted
+            self.hold()
+            self.last = (list(self.measured), [0.0] * len(self.measured))
 
     def hold(self):
         q = list(self.measured)
@@ -277,24 +289,39 @@ def main():
             finish(old, GoalStatus.PREEMPTED, 0)
 
     def set_halted(value):
+        # As the driver does: what it tells on a change is the value before it; the right one
+        # follows within a second.
+        halted.publish(Bool(arm.halted))
+        arm.halt(value)
+
+    def service(value):
         def call(_):
-            with arm.lock:
-                arm.halted = value
-                # The controller is stopped and started again: it holds where the arm is.
-                arm.hold()
-            halted.publish(Bool(value))
+            set_halted(value)
             return EmptyResponse()
 
         return call
 
-    rospy.Subscriber(side + "/command", JointTrajectory, on_command, queue_size=50,
+    def play():
+        for line in sys.stdin:
+            word = line.strip()
+            if word in ("mute", "speak"):
+                arm.mute, arm.age = word == "mute", 0.0
+            elif word == "old":
+                arm.age = 0.6
+            elif word in ("halt", "run"):
+                set_halted(word == "halt")
+            elif word == "deaf":
+                commands.unregister()
+
+    commands = rospy.Subscriber(side + "/command", JointTrajectory, on_command, queue_size=50,
                      tcp_nodelay=True)
     rospy.Subscriber(side + "/follow_joint_trajectory/goal", ActionGoal, on_goal, queue_size=5,
                      tcp_nodelay=True)
-    rospy.Service("/pr2_ethercat/halt_motors", Empty, set_halted(True))
-    rospy.Service("/pr2_ethercat/reset_motors", Empty, set_halted(False))
+    rospy.Service("/pr2_ethercat/halt_motors", Empty, service(True))
+    rospy.Service("/pr2_ethercat/reset_motors", Empty, service(False))
     calibrated.publish(Bool(True))
     halted.publish(Bool(False))
+    threading.Thread(target=play, daemon=True).start()
     print("pr2_arm: ready", flush=True)
 
     began = before = time.time()
@@ -309,12 +336,13 @@ def main():
         if now >= next_state:
             next_state = max(now, next_state + 0.01)
             message = JointState()
-            message.header.stamp = rospy.Time.from_sec(now)
+            message.header.stamp = rospy.Time.from_sec(now - arm.age)
             message.name = names + [name for name, _ in held]
             message.position = list(arm.measured) + [position for _, position in held]
             message.velocity = list(arm.speed) + [0.0] * len(held)
             message.effort = [0.0] * len(message.name)
-            states.publish(message)
+            if not arm.mute:
+                states.publish(message)
             measured.append([now - began] + list(arm.measured) + list(arm.last[0]))
         if now >= next_flag:
             next_flag = now + 1.0
