@@ -156,7 +156,7 @@ impl<'a> Lab<'a> {
                 ensure!(held.plan == PlanId::NONE, "a plan of before the restart was started");
             }
             Victim::Mock => {
-                self.system.mock.kill()?;
+                self.system.endpoint.kill()?;
                 // The plan may have been over by then; else the loss of the arm ends it.
                 self.system.witness.end(plan)?;
                 let lost = self.system.witness.mode(Mode::Fault)?;
@@ -167,7 +167,7 @@ impl<'a> Lab<'a> {
                 let initial = format!("--initial={}", at.join(","));
                 let name = format!("mock-{}", self.starts);
                 let options = PATIENT_MOCK.map(String::from).into_iter().chain([initial]);
-                self.system.mock = start_mock(self.stage, &name, options)?;
+                self.system.endpoint = start_mock(self.stage, &name, options)?;
                 self.reset()?;
             }
         }

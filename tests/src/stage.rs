@@ -1,7 +1,7 @@
 //! Processes on one stage: each system under one root path of its own, every process killed when
 //! its owner goes, whatever the reason.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -115,11 +115,21 @@ impl Stage {
         name: &str,
         args: impl IntoIterator<Item = A>,
     ) -> io::Result<Process> {
+        let own = std::iter::once(part.argument().into());
+        self.launch(&self.program, name, own.chain(args.into_iter().map(Into::into)))
+    }
+
+    /// Starts another program.
+    pub fn launch(
+        &self,
+        program: impl AsRef<OsStr>,
+        name: &str,
+        args: impl IntoIterator<Item = OsString>,
+    ) -> io::Result<Process> {
         let (stdout, stderr) =
             (self.file(&format!("{name}.out")), self.file(&format!("{name}.err")));
-        let child = Command::new(&self.program)
-            .arg(part.argument())
-            .args(args.into_iter().map(Into::into))
+        let child = Command::new(program)
+            .args(args)
             .stdin(Stdio::null())
             .stdout(File::create(&stdout)?)
             .stderr(File::create(&stderr)?)

@@ -1,4 +1,4 @@
-//! Mock and executor on one stage and somebody who watches them: how the demo, the killing lab and
+//! Endpoint and executor on one stage and somebody who watches them: how the demo, the killing lab and
 //! the tests begin and end.
 
 use std::ffi::OsString;
@@ -18,14 +18,14 @@ pub const PATIENT: [&str; 4] = ["--stale-ms", "100", "--lost-ms", "400"];
 /// For a mock there.
 pub const PATIENT_MOCK: [&str; 2] = ["--timeout", "100"];
 
-/// Where the mock writes its verdict, a file of the stage.
-const VERDICT: &str = "mock.json";
+/// Where the endpoint writes its verdict, a file of the stage.
+pub const VERDICT: &str = "endpoint.json";
 
 /// A system that holds the arm and takes plans.
 #[derive(Debug)]
 pub struct System {
-    /// The mock endpoint.
-    pub mock: Process,
+    /// The endpoint, mostly the mock.
+    pub endpoint: Process,
     /// The executor.
     pub executor: Process,
     /// Who watches.
@@ -42,11 +42,19 @@ impl System {
         mock: impl IntoIterator<Item = impl Into<OsString>>,
         executor: impl IntoIterator<Item = impl Into<OsString>>,
     ) -> anyhow::Result<Self> {
+        Self::around(stage, start_mock(stage, "mock", mock)?, executor)
+    }
+
+    /// The same with an endpoint that was started before.
+    pub fn around(
+        stage: &Stage,
+        endpoint: Process,
+        executor: impl IntoIterator<Item = impl Into<OsString>>,
+    ) -> anyhow::Result<Self> {
         let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
         let witness = Witness::open(&ipc)?;
-        let mock = start_mock(stage, "mock", mock)?;
         let executor = start_executor(stage, "executor", executor)?;
-        let mut system = Self { mock, executor, witness, ipc };
+        let mut system = Self { endpoint, executor, witness, ipc };
         system.until(|witness| witness.mode(Mode::Hold))?;
         Ok(system)
     }
@@ -58,7 +66,7 @@ impl System {
         wait: impl FnOnce(&mut Witness) -> Result<T, E>,
     ) -> anyhow::Result<T> {
         wait(&mut self.witness).map_err(|error| {
-            for process in [&mut self.mock, &mut self.executor] {
+            for process in [&mut self.endpoint, &mut self.executor] {
                 if let Ok(Some(status)) = process.status() {
                     let (name, said) = (process.name(), process.last_words());
                     return anyhow::anyhow!("{name} ended ({status}): {said}");
@@ -68,10 +76,10 @@ impl System {
         })
     }
 
-    /// Ends executor and mock and reads the mock's verdict.
+    /// Ends executor and endpoint and reads the endpoint's verdict.
     pub fn end<T: DeserializeOwned>(&mut self, stage: &Stage) -> anyhow::Result<T> {
         self.executor.terminate(PATIENCE)?;
-        verdict(stage, &mut self.mock)
+        verdict(stage, &mut self.endpoint)
     }
 }
 
@@ -99,10 +107,10 @@ pub fn start_executor(
     stage.start(Part::Executor, name, args)
 }
 
-/// Ends the mock and reads its verdict.
-pub fn verdict<T: DeserializeOwned>(stage: &Stage, mock: &mut Process) -> anyhow::Result<T> {
-    mock.terminate(PATIENCE)?.context("the mock does not end on SIGTERM")?;
+/// Ends an endpoint and reads its verdict.
+pub fn verdict<T: DeserializeOwned>(stage: &Stage, endpoint: &mut Process) -> anyhow::Result<T> {
+    endpoint.terminate(PATIENCE)?.context("the endpoint does not end on SIGTERM")?;
     let text = fs::read(stage.file(VERDICT))
-        .with_context(|| format!("no verdict of the mock: {}", mock.last_words()))?;
-    serde_json::from_slice(&text).context("the mock's verdict")
+        .with_context(|| format!("no verdict of the endpoint: {}", endpoint.last_words()))?;
+    serde_json::from_slice(&text).context("the endpoint's verdict")
 }

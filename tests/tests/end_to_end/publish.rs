@@ -85,7 +85,7 @@ fn a_plan_file_is_published_swept_and_continued() {
     let sketch = Sketch::through(&arm, &[from, arm.home(), from, arm.home()], 0.05);
     let first = plan(&arm, &sketch);
     let path = write(&stage, "first.json", &first);
-    let System { mut mock, mut witness, executor: _executor, .. } = start(&stage, &path);
+    let System { endpoint: mut mock, mut witness, executor: _executor, .. } = start(&stage, &path);
 
     let (code, said) = ended(publish(&stage, &path, &[]));
     assert_eq!(code, Some(0), "{said}");
@@ -116,7 +116,7 @@ fn a_plan_file_for_another_torso_height_is_rejected_with_its_reason() {
     let arm = right_arm();
     let sketch = Sketch::swings(&arm, &arm.home(), 1, 0.1, 0.1);
     let path = write(&stage, "plan.json", &plan(&arm, &sketch));
-    let System { mut mock, executor: _executor, .. } = start(&stage, &path);
+    let System { endpoint: mut mock, executor: _executor, .. } = start(&stage, &path);
     let other = arm.with_held(&[("torso_lift_joint", 0.3)]).expect("a torso");
     let other = write(&stage, "other.json", &plan(&other, &sketch));
     let (code, said) = ended(publish(&stage, &other, &[]));

@@ -94,7 +94,7 @@ fn a_sweep_goes_on_under_another_cost_without_a_stop() {
     assert!(visited(&second) < visited(&first), "only what is left is swept");
 
     system.executor.terminate(PATIENCE).expect("it ends");
-    let found = verdict(&stage, &mut system.mock);
+    let found = verdict(&stage, &mut system.endpoint);
     assert_eq!(found["violations"], 0, "{found:#}");
     let runs = found["verdict"]["plans"].as_array().expect("plans");
     let join = runs.iter().find(|r| r["plan"] == new.plan.to_string()).expect("it ran");
@@ -114,7 +114,7 @@ fn a_plan_that_comes_too_late_goes_on_from_where_the_arm_was_stopped() {
     assert_eq!((old.kind, old.reason), (EventKind::Aborted.wire(), Reason::Stopped.wire()));
     assert!(Plan::read(&second).expect("read").continues.is_none());
     system.executor.terminate(PATIENCE).expect("it ends");
-    let found = verdict(&stage, &mut system.mock);
+    let found = verdict(&stage, &mut system.endpoint);
     assert_eq!(found["violations"], 0, "{found:#}");
 }
 

@@ -42,7 +42,7 @@ impl Rig {
     pub(crate) fn start() -> Self {
         let stage = stage();
         let arm = right_arm();
-        let System { mock, executor, witness, ipc } = start(&stage, &[]);
+        let System { endpoint: mock, executor, witness, ipc } = start(&stage, &[]);
         let publisher = ipc.plan_publisher(MAX_KNOTS).expect("the test can publish");
         Self { executor, mock, witness, publisher, arm, stage }
     }
