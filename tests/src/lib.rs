@@ -33,4 +33,5 @@ pub mod servo;
 pub mod sketch;
 pub mod stage;
 pub mod system;
+pub mod tracking;
 pub mod witness;

@@ -27,6 +27,7 @@ use crate::fault::FaultAt;
 use crate::judge::{Rules, Verdict};
 use crate::measured::{Swept, swept};
 use crate::record::Recorder;
+use crate::tracking::Tracking;
 
 const PERIOD_NS: u64 = 1_000_000;
 
@@ -92,6 +93,8 @@ pub struct Outcome {
     pub own_late_cycles: u64,
     /// What the measured positions have swept, where a plan was given.
     pub swept: Option<Swept>,
+    /// How the arm followed, where a plan ran.
+    pub tracking: Option<Tracking>,
 }
 
 /// Runs the mock with the arguments of a command line, program name first.
@@ -178,6 +181,7 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
         endpoint: endpoint.deeds(),
         own_late_cycles,
         swept: plan.as_ref().map(|plan| swept(plan, &arm, recorder.postures())),
+        tracking: recorder.tracking(),
     };
     if let Some(path) = &args.record {
         let file = File::create(path)
@@ -258,6 +262,9 @@ fn table(outcome: &Outcome) -> String {
     if let Some(swept) = &outcome.swept {
         row("swept of reachable points", format!("{:.2} %", 100.0 * swept.reachable));
         row("swept of all points", format!("{:.2} %", 100.0 * swept.all));
+    }
+    if let Some(Tracking { p50, p95, max }) = outcome.tracking {
+        row("tracking error", format!("p50 {p50:.4}, p95 {p95:.4}, max {max:.4} rad"));
     }
     for run in verdict.plans.iter().filter(|run| run.plan != "0/0") {
         row(

@@ -5,6 +5,8 @@ use std::io::{self, Write};
 use nullsweep_ipc_types::{PlanId, Setpoint};
 use nullsweep_robot::JointVector;
 
+use crate::tracking::Tracking;
+
 /// One measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -60,6 +62,16 @@ impl Recorder {
     /// The measured positions so far, oldest first.
     pub fn postures(&self) -> impl Iterator<Item = JointVector> + '_ {
         self.samples.iter().map(|s| s.positions)
+    }
+
+    /// How the arm followed while plans ran; `None` if none did.
+    #[must_use]
+    pub fn tracking(&self) -> Option<Tracking> {
+        let off = |s: &Sample| {
+            let joints = s.positions.iter().zip(&s.commanded);
+            joints.map(|(q, wanted)| (q - wanted).abs()).fold(0.0, f64::max)
+        };
+        Tracking::of(self.samples.iter().filter(|s| s.plan != PlanId::NONE).map(off).collect())
     }
 
     /// Writes time since the first measurement \[s\], plan, knot, measured and commanded joints.

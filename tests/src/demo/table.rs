@@ -3,6 +3,7 @@
 use comfy_table::{CellAlignment, Table, presets};
 
 use super::{Outcome, Planned};
+use crate::tracking::Tracking;
 
 /// The table, the checks and where the report is.
 pub(super) fn text(outcome: &Outcome) -> String {
@@ -35,16 +36,19 @@ pub(super) fn text(outcome: &Outcome) -> String {
     };
     let swap = &outcome.swap;
     row("swap", format!("in knot {} at {:.1} s", swap.knot, swap.at_s));
-    row(
-        "in the cycle of the swap",
-        format!(
-            "step {:.0} % of v·T, velocity by {:.2} rad/s",
-            100.0 * swap.step_ratio,
-            swap.velocity_step
-        ),
-    );
-    row("setpoints at the endpoint", outcome.setpoints.to_string());
-    row("violations at the endpoint", outcome.violations.to_string());
+    if let (Some(step), Some(velocity)) = (swap.step_ratio, swap.velocity_step) {
+        let step = 100.0 * step;
+        row(
+            "in the cycle of the swap",
+            format!("step {step:.0} % of v·T, velocity by {velocity:.3} rad/s"),
+        );
+    }
+    if let Some([setpoints, violations]) = outcome.judged {
+        row("setpoints at the endpoint", setpoints.to_string());
+        row("violations at the endpoint", violations.to_string());
+    }
+    let Tracking { p50, p95, max } = outcome.tracking;
+    row("tracking error", format!("p50 {p50:.4}, p95 {p95:.4}, max {max:.4} rad"));
     row("measured coverage, reachable", percent(outcome.measured.reachable));
     row("measured coverage, all", percent(outcome.measured.all));
     let [n, p50, _, p99, p999, _, max] = outcome.lateness.cells();
@@ -61,6 +65,9 @@ pub(super) fn text(outcome: &Outcome) -> String {
         text.push_str(&format!("\n{mark} {}: {}", check.what, check.found));
     }
     text.push_str(&format!("\nreport: {}", outcome.report.display()));
+    if let Some(picture) = &outcome.picture {
+        text.push_str(&format!("\npicture: {}", picture.display()));
+    }
     text
 }
 
