@@ -1,14 +1,17 @@
 """A PR2 arm in MuJoCo as the executor's hardware endpoint: setpoints in, joint states out, 1 kHz.
 
     python3 endpoint.py PLAN.json [--picture arm.png] [--json figures.json]
+    python3 endpoint.py --check
 
-Stands where the plan begins. At its end (SIGINT, SIGTERM) it prints the tracking error and how
-much of the plan's surface the measured positions have swept. Needs mujoco, numpy, iceoryx2==0.10.0
-and xxhash; matplotlib for the picture.
+Stands where the plan begins. At its end (SIGINT, SIGTERM) it tells the tracking error while plans
+ran and how much of the plan's surface the measured positions have swept. `cargo run --release
+--bin demo -- --hardware mujoco` runs it with everything around it. Exit code 77: packages are
+missing; it says which. --check does no more than that.
 """
 
 import argparse
 import collections
+import importlib.metadata
 import json
 import math
 import os
@@ -20,15 +23,31 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "python"))
 
+NEEDED = {"mujoco": None, "numpy": None, "matplotlib": None, "xxhash": None, "iceoryx2": "0.10.0"}
+
+
+def need_packages():
+    lacking = []
+    for name, version in NEEDED.items():
+        try:
+            found = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found = None
+        if found is None or version not in (None, found):
+            lacking.append(name if version is None else f"{name}=={version}")
+    if lacking:
+        print(f"missing for {sys.executable}:\n    pip install {' '.join(lacking)}")
+        sys.exit(77)
+
+
+need_packages()
+
+import mujoco
+import numpy as np
+
 import model as arm_model
 import nullsweep_ipc
 import nullsweep_types as types
-
-try:
-    import mujoco
-    import numpy as np
-except ImportError as error:
-    sys.exit(f"{error}: pip install mujoco numpy iceoryx2==0.10.0 xxhash matplotlib")
 
 STEP_NS = 1_000_000
 START_TOLERANCE = 0.02
@@ -95,31 +114,52 @@ def swept(plan, model, postures):
     return hit, np.array(pads)
 
 
-def share(hit, plan):
-    reachable = np.array([s["r"] for s in plan["surface"]])
-    return float(hit[reachable].mean()), float(hit.mean())
+def faces(model, data):
+    """The faces of all shapes of the arm where it stands: boxes, and cylinders as prisms."""
+    for g in range(model.ngeom):
+        size = model.geom_size[g]
+        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX:
+            ring = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * size[:2]
+            height = size[2]
+        else:
+            turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+            ring = np.stack([np.cos(turn), np.sin(turn)], axis=1) * size[0]
+            height = size[1]
+        ends = [np.column_stack([ring, np.full(len(ring), z)]) for z in (-height, height)]
+        sides = [np.array([ends[0][i - 1], ends[0][i], ends[1][i], ends[1][i - 1]])
+                 for i in range(len(ring))]
+        for face in ends + sides:
+            yield data.geom_xpos[g] + face @ data.geom_xmat[g].reshape(3, 3).T
 
 
 def picture(path, plan, simulation, hit, pads, rows):
+    """The arm at the chair in the middle of its sweep, and how far it was from its setpoints."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    figure = plt.figure(figsize=(13, 6))
-    scene = figure.add_subplot(1, 2, 1, projection="3d")
+    figure = plt.figure(figsize=(14, 6.5))
+    scene = figure.add_subplot(1, 2, 1, projection="3d", computed_zorder=False)
     points = np.array([s["p"] for s in plan["surface"]])
-    scene.scatter(*points[hit].T, s=1, c="#2a8a4a", label="swept")
-    scene.scatter(*points[~hit].T, s=1, c="#c0c4cc", label="not swept")
-    scene.plot(*pads.T, lw=0.7, c="#d1350f", label="pad, measured")
-    middle = len(rows) // 2
-    simulation.data.qpos[:] = rows[middle][1]
+    scene.scatter(*points[~hit].T, s=2, c="#c0c4cc", label="scanned, not swept", zorder=1)
+    scene.scatter(*points[hit].T, s=2, c="#2a8a4a", label="swept", zorder=2)
+    moving = [r for r in rows if r[3]] or rows
+    simulation.data.qpos[:] = moving[len(moving) // 2][1]
     mujoco.mj_kinematics(simulation.model, simulation.data)
-    chain = [simulation.data.body(i).xpos.copy() for i in range(1, simulation.model.nbody)]
-    scene.plot(*np.array(chain).T, "o-", c="#30343c", lw=3, ms=4, label="arm")
-    scene.set_box_aspect(np.ptp(np.vstack([points, chain]), axis=0))
+    arm = list(faces(simulation.model, simulation.data))
+    scene.add_collection3d(Poly3DCollection(arm, facecolor="#8fa3bf", edgecolor="#4a5a72",
+                                            linewidth=0.2, alpha=0.9, zorder=3))
+    scene.plot(*pads.T, lw=0.8, c="#d1350f", label="pad, measured", zorder=4)
+    everything = np.vstack([points, *arm])
+    scene.set(xlim=(everything[:, 0].min(), everything[:, 0].max()),
+              ylim=(everything[:, 1].min(), everything[:, 1].max()),
+              zlim=(everything[:, 2].min(), everything[:, 2].max()),
+              xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    scene.set_box_aspect(np.ptp(everything, axis=0))
+    scene.view_init(elev=28, azim=-125)
     scene.legend(loc="upper left", fontsize=8)
-    scene.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     chart = figure.add_subplot(1, 2, 2)
     times = np.array([r[0] for r in rows])
     errors = np.array([np.abs(r[1] - r[2]) for r in rows])
@@ -133,7 +173,9 @@ def picture(path, plan, simulation, hit, pads, rows):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("plan", help="stand where this plan begins, and measure what is swept of it")
+    parser.add_argument("plan", nargs="?",
+                        help="stand where this plan begins, and measure what is swept of it")
+    parser.add_argument("--check", action="store_true", help="end: the packages are all there")
     parser.add_argument("--robot-name", default="pr2")
     parser.add_argument("--ipc-root", help="iceoryx2's root path, if not the default")
     parser.add_argument("--urdf", default=HERE.parent.parent / "robot" / "pr2.urdf")
@@ -142,6 +184,10 @@ def main():
     parser.add_argument("--picture", help="where the picture is written, PNG")
     parser.add_argument("--json", help="where the figures are written")
     args = parser.parse_args()
+    if args.check:
+        return
+    if args.plan is None:
+        parser.error("a plan is needed")
     with open(args.plan) as file:
         plan = json.load(file)
     simulation = Simulation(plan, args.urdf)
@@ -164,7 +210,7 @@ def main():
     for i, held in enumerate(plan["held"]):
         state.held_positions[i] = held["position"]
     waiting, rows = collections.deque(), []
-    following = timed_out = disabled = False
+    following = timed_out = disabled = running = False
     last_deadline = None
     began = clock = nullsweep_ipc.now_ns()
     refused = timeouts = 0
@@ -185,7 +231,7 @@ def main():
                     continue
                 last_deadline, timed_out = s.deadline_ns, False
                 state.setpoint_sequence, state.setpoint_received_ns = s.sequence, clock
-                disabled = s.disable != 0
+                disabled, running = s.disable != 0, s.plan.epoch != 0
                 simulation.enabled = not disabled
                 wanted = np.array(s.positions[:dof])
                 if disabled:
@@ -205,7 +251,7 @@ def main():
             simulation.step()
             if (clock - began) // STEP_NS % 5 == 0:
                 rows.append(((clock - began) * 1e-9, simulation.data.qpos.copy(),
-                             simulation.wanted.copy()))
+                             simulation.wanted.copy(), running))
         state.sequence += 1
         state.stamp_ns = clock
         state.positions[:dof] = simulation.data.qpos
@@ -216,26 +262,24 @@ def main():
         states.send(state)
 
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    if not rows:
-        sys.exit("nothing was recorded")
-    error = np.array([np.abs(r[1] - r[2]).max() for r in rows])
     # The pad moves by less than a third of its width in 20 ms.
     hit, pads = swept(plan, simulation.model, [r[1] for r in rows[::4]])
-    asked, _ = swept(plan, simulation.model, [r[2] for r in rows[::4]])
+    reachable = np.array([s["r"] for s in plan["surface"]])
+    error = np.array([np.abs(r[1] - r[2]).max() for r in rows if r[3]])
+    tracking = None
+    if len(error):
+        p50, p95 = np.percentile(error, [50, 95])
+        tracking = {"p50": p50, "p95": p95, "max": error.max()}
+        print("tracking error [rad]:", ", ".join(f"{k} {v:.4f}" for k, v in tracking.items()))
+    # The same shape as mock-hardware's verdict, which has a judge's findings as well.
     figures = {
-        "seconds": rows[-1][0],
-        "tracking_p50_rad": float(np.percentile(error, 50)),
-        "tracking_p95_rad": float(np.percentile(error, 95)),
-        "tracking_max_rad": float(error.max()),
-        "swept_reachable": share(hit, plan)[0],
-        "swept_all": share(hit, plan)[1],
-        "commanded_swept_reachable": share(asked, plan)[0],
-        "measured_of_commanded": float(hit.sum() / max(asked.sum(), 1)),
-        "timeouts": timeouts,
-        "refused": refused,
+        "seconds": (clock - began) * 1e-9,
+        "tracking": tracking,
+        "swept": {"all": hit.mean(), "reachable": hit[reachable].mean(), "points": len(hit)},
+        "endpoint": {"timeouts": timeouts, "refused": refused, "states": state.sequence},
     }
-    for name, value in figures.items():
-        print(f"{name:28} {value:.5g}")
+    print(f"swept of reachable points: {100 * hit[reachable].mean():.1f} %")
+    print(f"stopped by itself {timeouts} times, refused {refused} setpoints")
     if args.json:
         pathlib.Path(args.json).write_text(json.dumps(figures, indent=2))
     if args.picture:

@@ -56,6 +56,8 @@ def main():
     with open(args.plan) as file:
         robot = json.load(file)
     dof = len(robot["joints"])
+    if not 0 <= args.joint < dof:
+        parser.error(f"--joint must be 0 to {dof - 1}")
 
     ipc = nullsweep_ipc.Ipc(args.robot_name, args.ipc_root)
     telemetry = ipc.receiver("telemetry", types.Telemetry)
