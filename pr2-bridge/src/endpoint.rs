@@ -74,6 +74,10 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
         while let Ok(News::Joints(message, at_ns)) = link.news.try_recv() {
             let Some(mut state) = ear.hear(&message, at_ns) else { continue };
             state.status = health.status;
+            if disabled {
+                // The driver tells it up to a second later.
+                state.status |= status::HALTED;
+            }
             if stopped {
                 state.status |= status::SETPOINT_TIMEOUT;
             }

@@ -17,6 +17,8 @@ pub struct Terms {
     /// How soon after the last setpoint's deadline the endpoint must have stopped and said so.
     /// \[ms\]
     pub grace_ms: u64,
+    /// How soon the motors must be on again once a disable is taken back. \[ms\]
+    pub power_ms: u64,
     /// How old a state may be when it is read. \[ms\]
     pub stale_ms: u64,
     /// How far the arm may be from its setpoint at rest. \[rad\] or \[m\]
@@ -28,7 +30,15 @@ pub struct Terms {
 impl Default for Terms {
     /// The executor's own bounds.
     fn default() -> Self {
-        Self { angle: 0.08, speed: 0.1, grace_ms: 100, stale_ms: 20, tolerance: 0.02, lag: 0.15 }
+        Self {
+            angle: 0.08,
+            speed: 0.1,
+            grace_ms: 100,
+            power_ms: 300,
+            stale_ms: 20,
+            tolerance: 0.02,
+            lag: 0.15,
+        }
     }
 }
 
@@ -345,9 +355,12 @@ fn disable<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<
     }
     let q = rig.measured();
     let on = rig.at(q);
-    rig.keep(&on, ms(300))?;
+    rig.keep(&on, ms(terms.power_ms))?;
     if rig.has(status::HALTED) {
-        return broken("300 ms after the disable was taken back it is still halted".into());
+        return broken(format!(
+            "{} ms after the disable was taken back it is still halted",
+            terms.power_ms
+        ));
     }
     rig.near(&q, terms.tolerance, "after the motors came on again")
 }

@@ -42,6 +42,9 @@ struct Args {
     /// How soon after the last setpoint's deadline it must stop and say so, in ms
     #[arg(long, default_value_t = Terms::default().grace_ms, value_name = "MS")]
     grace: u64,
+    /// How soon its motors must be on again once a disable is taken back, in ms
+    #[arg(long, default_value_t = Terms::default().power_ms, value_name = "MS")]
+    power: u64,
     /// How far the arm may be from its setpoint at rest, in rad
     #[arg(long, default_value_t = Terms::default().tolerance)]
     tolerance: f64,
@@ -116,6 +119,7 @@ fn run(args: &Args) -> anyhow::Result<bool> {
         angle: args.angle,
         speed: args.speed,
         grace_ms: args.grace,
+        power_ms: args.power,
         tolerance: args.tolerance,
         ..Terms::default()
     };
