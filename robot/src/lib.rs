@@ -13,7 +13,7 @@
 //!
 //! The way through the crate: `urdf` (text to tree) → `arm` (tree to serial chain, poses,
 //! Jacobian) → `limits` (soft limits and the braking margin that planner and executor share) →
-//! `ik` (closed form for PR2-shaped arms, numeric for all others). `fingerprint` names a robot
+//! `ik` (closed forms for arms of known shapes, numeric for all others). `fingerprint` names a robot
 //! and arm in 64 bits so that a plan reaches only the robot it was made for.
 //!
 //! Everything speaks the robot's *root frame* (the one link without a parent joint; the PR2's

@@ -27,6 +27,7 @@ fn arms() -> Vec<(&'static str, Arm)> {
 #[test]
 fn solutions_reach_the_target_inside_the_limits_and_the_posture_is_found() {
     for (name, arm) in arms() {
+        let ik = arm.numeric_ik();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let (mut out, mut again) = (Solutions::new(), Solutions::new());
         let (count, mut found, mut total, mut ambiguous) = (300, 0, 0, 0);
@@ -34,8 +35,8 @@ fn solutions_reach_the_target_inside_the_limits_and_the_posture_is_found() {
         for _ in 0..count {
             let q = random(&arm, &mut rng);
             let target = arm.tip_pose(&q);
-            let redundancy = arm.ik().redundant_joint().map_or(0.0, |joint| q[joint]);
-            arm.ik().solve(&target, redundancy, &mut out);
+            let redundancy = ik.redundant_joint().map_or(0.0, |joint| q[joint]);
+            ik.solve(&target, redundancy, &mut out);
             for (i, solution) in out.iter().enumerate() {
                 let reached = arm.tip_pose(&solution.q);
                 let shift = (reached.translation.vector - target.translation.vector).norm();
@@ -55,8 +56,8 @@ fn solutions_reach_the_target_inside_the_limits_and_the_posture_is_found() {
         );
         // The same call gives the same bits.
         let target = arm.tip_pose(&arm.home());
-        arm.ik().solve(&target, 0.1, &mut out);
-        arm.ik().solve(&target, 0.1, &mut again);
+        ik.solve(&target, 0.1, &mut out);
+        ik.solve(&target, 0.1, &mut again);
         assert_eq!(out, again);
         assert!(found * 100 >= count * 98, "{name}: {found} of {count}");
     }
@@ -65,6 +66,7 @@ fn solutions_reach_the_target_inside_the_limits_and_the_posture_is_found() {
 #[test]
 fn a_branch_is_followed_along_a_path() {
     for (name, arm) in arms() {
+        let ik = arm.numeric_ik();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let (mut whole, mut steps) = (0, 0);
         let (count, parts) = (100, 50);
@@ -76,9 +78,9 @@ fn a_branch_is_followed_along_a_path() {
             for (q, &(lower, upper)) in to.iter_mut().zip(arm.margined_limits()) {
                 *q = (*q + rng.random_range(-0.4..0.4)).clamp(lower, upper);
             }
-            let redundant = arm.ik().redundant_joint();
+            let redundant = ik.redundant_joint();
             let value = |q: &JointVector| redundant.map_or(0.0, |joint| q[joint]);
-            arm.ik().solve(&arm.tip_pose(&from), value(&from), &mut out);
+            ik.solve(&arm.tip_pose(&from), value(&from), &mut out);
             let Some(start) = out.iter().find(|s| farthest(&s.q, &from) < 1e-4) else { continue };
             let (branch, mut near) = (start.branch, start.q);
             let mut reached = true;
@@ -86,8 +88,7 @@ fn a_branch_is_followed_along_a_path() {
                 let t = f64::from(k) / f64::from(parts);
                 let q: JointVector = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t);
                 steps += 1;
-                let Some(next) = arm.ik().solve_on(branch, &arm.tip_pose(&q), value(&q), &near)
-                else {
+                let Some(next) = ik.solve_on(branch, &arm.tip_pose(&q), value(&q), &near) else {
                     reached = false;
                     break;
                 };

@@ -250,8 +250,9 @@ impl Arm {
         home
     }
 
-    /// Inverse kinematics: in closed form for an arm of the PR2's shape with the upper-arm roll
-    /// as redundancy, numeric otherwise.
+    /// Inverse kinematics. In closed form for an arm of the PR2's shape (the upper-arm roll is the
+    /// redundancy), six-axis arms with a spherical wrist or three parallel axes, and arms of seven
+    /// that are like that with one joint held; numeric otherwise.
     #[must_use]
     pub fn ik(&self) -> &dyn InverseKinematics {
         self.solvers.default()
@@ -272,7 +273,7 @@ impl Arm {
 
     /// Same kinematics as the PR2's and its joint names.
     fn is_pr2(&self) -> bool {
-        self.solvers.closed_form() && self.names.iter().all(|n| pr2::ready(n).is_some())
+        self.solvers.is_pr2_shaped() && self.names.iter().all(|n| pr2::ready(n).is_some())
     }
 
     fn changed(&self, limits: Vec<JointLimits>, held: Vec<HeldJoint>) -> Self {

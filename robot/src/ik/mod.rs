@@ -1,5 +1,6 @@
 //! Inverse kinematics behind one trait.
 
+mod analytic;
 mod closed;
 mod folds;
 mod lanes;
@@ -7,6 +8,8 @@ mod numeric;
 mod pan;
 mod roll;
 mod shape;
+mod six;
+mod subproblem;
 
 use std::sync::Arc;
 
@@ -15,6 +18,7 @@ use nalgebra::Isometry3;
 use crate::JointVector;
 use crate::chain::Chain;
 use crate::limits::JointLimits;
+use analytic::Analytic;
 use closed::ClosedForm;
 pub(crate) use numeric::Numeric;
 use pan::ShoulderPan;
@@ -57,8 +61,8 @@ pub trait InverseKinematics: Send + Sync {
     /// All solutions for a pose of the tip in the root frame at one value of the redundancy.
     ///
     /// `out` is cleared first. Joints with limits take the value nearest to the middle of their
-    /// range, continuous joints one in (−π, π]. The closed form's are not filtered by limits; the
-    /// numeric solver looks only inside the margined limits.
+    /// range, continuous joints one in (−π, π]. The closed form of the PR2's shape does not filter
+    /// by limits; the other solvers give only solutions inside the margined ones.
     fn solve(&self, target: &Isometry3<f64>, redundancy: f64, out: &mut Solutions);
 
     /// The solution on one branch, continuous joints unwrapped nearest to `near`.
@@ -85,13 +89,17 @@ pub enum RedundantJoint {
 #[derive(Clone)]
 pub(crate) enum Solvers {
     Pr2 { roll: Arc<ClosedForm<UpperArmRoll>>, pan: Arc<ClosedForm<ShoulderPan>> },
+    Analytic(Arc<Analytic>),
     Numeric(Arc<Numeric>),
 }
 
 impl Solvers {
     pub(crate) fn new(chain: &Chain, limits: &[JointLimits], margined: &[(f64, f64)]) -> Self {
         let Some(shape) = Pr2Shape::recognise(chain, limits) else {
-            return Self::Numeric(Arc::new(Numeric::new(chain, limits, margined)));
+            return match Analytic::recognise(chain, limits, margined) {
+                Some(analytic) => Self::Analytic(Arc::new(analytic)),
+                None => Self::Numeric(Arc::new(Numeric::new(chain, limits, margined))),
+            };
         };
         let (roll, pan) = (UpperArmRoll::new(&shape), ShoulderPan::new(&shape));
         Self::Pr2 {
@@ -103,6 +111,7 @@ impl Solvers {
     pub(crate) fn default(&self) -> &dyn InverseKinematics {
         match self {
             Self::Pr2 { roll, .. } => roll.as_ref(),
+            Self::Analytic(analytic) => analytic.as_ref(),
             Self::Numeric(numeric) => numeric.as_ref(),
         }
     }
@@ -111,11 +120,11 @@ impl Solvers {
         match (self, joint) {
             (Self::Pr2 { roll, .. }, RedundantJoint::UpperArmRoll) => Some(roll.as_ref()),
             (Self::Pr2 { pan, .. }, RedundantJoint::ShoulderPan) => Some(pan.as_ref()),
-            (Self::Numeric(_), _) => None,
+            (Self::Analytic(_) | Self::Numeric(_), _) => None,
         }
     }
 
-    pub(crate) fn closed_form(&self) -> bool {
+    pub(crate) fn is_pr2_shaped(&self) -> bool {
         matches!(self, Self::Pr2 { .. })
     }
 }

@@ -218,7 +218,7 @@ impl Numeric {
             let sine = normal.norm();
             normal * (sine.atan2(axis.dot(&wanted)) / sine.max(f64::MIN_POSITIVE))
         } else {
-            (target.rotation * tip.rotation.inverse()).scaled_axis()
+            return (pose_error(&tip, target), jacobian);
         };
         (Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z), jacobian)
     }
@@ -332,10 +332,18 @@ impl InverseKinematics for Numeric {
     }
 }
 
+/// Way from a pose to another, linear \[m\] then angular \[rad\].
+#[inline]
+pub(super) fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
+    let shift = to.translation.vector - from.translation.vector;
+    let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
+    Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
+}
+
 /// Jᵀ (J Jᵀ + λ I)⁻¹ e over the free columns, 0 in the others: the solver's inner loop, by hand
 /// since general matrices took most of its time.
 #[inline]
-fn damped_step(
+pub(super) fn damped_step(
     jacobian: &Jacobian,
     free: &[bool; MAX_DOF],
     error: &Vector6<f64>,
