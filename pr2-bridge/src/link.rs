@@ -1,7 +1,6 @@
 //! The ROS side: topics, services, and whether the master is there. Everything that blocks or
 //! waits is in tasks of its own; the endpoint's loop exchanges values with them through channels.
 
-use std::net::ToSocketAddrs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc as std_mpsc;
@@ -99,7 +98,9 @@ pub struct Names {
     pub goals: bool,
 }
 
-/// How often the master is looked for.
+/// This node's name.
+const NODE: &str = "/nullsweep_bridge";
+/// How often the master is asked, and how long for.
 const LOOK: Duration = Duration::from_millis(500);
 
 impl Link {
@@ -171,7 +172,7 @@ fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
 
 async fn connect(master: &str) -> anyhow::Result<NodeHandle> {
     let limit = Duration::from_secs(5);
-    match tokio::time::timeout(limit, NodeHandle::new(master, "/nullsweep_bridge")).await {
+    match tokio::time::timeout(limit, NodeHandle::new(master, NODE)).await {
         Ok(Ok(node)) => Ok(node),
         Ok(Err(error)) => Err(error)
             .with_context(|| format!("no ROS master at {master}: start roscore, or set --master")),
@@ -237,28 +238,13 @@ async fn start(
     let topic = format!("{}/follow_joint_trajectory/goal", names.controller);
     let goal =
         node.advertise::<control_msgs::FollowJointTrajectoryActionGoal>(&topic, 5, false).await?;
-    let own = Arc::clone(&known);
-    let (driver, goals) = (common.driver.clone(), names.goals);
+    let driver = common.driver.clone();
     tokio::spawn(async move {
-        let mut look = tokio::time::interval(Duration::from_millis(20));
-        loop {
-            let order = tokio::select! {
-                order = orders.recv() => order,
-                _ = look.tick() => {
-                    let listens = if goals {
-                        goal.has_connected_clients()
-                    } else {
-                        command.has_connected_clients()
-                    };
-                    own.controller.store(listens, Ordering::Relaxed);
-                    continue;
-                }
-            };
+        while let Some(order) = orders.recv().await {
             let failed = match order {
-                None => break,
-                Some(Order::Command(message)) => command.publish(&message).await.err(),
-                Some(Order::Goal(message)) => goal.publish(&message).await.err(),
-                Some(Order::Call(service)) => {
+                Order::Command(message) => command.publish(&message).await.err(),
+                Order::Goal(message) => goal.publish(&message).await.err(),
+                Order::Call(service) => {
                     let (node, name) = (node.clone(), format!("{driver}/{}", service.name()));
                     tokio::spawn(async move {
                         let called = async {
@@ -280,23 +266,37 @@ async fn start(
         }
     });
 
-    let address = common.master.trim_start_matches("http://").trim_end_matches('/').to_owned();
-    tokio::task::spawn_blocking(move || {
+    let end = if names.goals { "follow_joint_trajectory/goal" } else { "command" };
+    let topic = format!("{}/{end}", names.controller);
+    let master = common.master.clone();
+    let client = reqwest::Client::builder().no_proxy().timeout(LOOK).build()?;
+    tokio::spawn(async move {
         loop {
-            let reached = address
-                .to_socket_addrs()
-                .ok()
-                .and_then(|mut all| all.next())
-                .is_some_and(|a| std::net::TcpStream::connect_timeout(&a, LOOK).is_ok());
-            if reached {
-                known.master_ns.store(now_ns(), Ordering::Relaxed);
+            match has_subscriber(&client, &master, &topic).await {
+                Ok(listens) => {
+                    known.controller.store(listens, Ordering::Relaxed);
+                    known.master_ns.store(now_ns(), Ordering::Relaxed);
+                }
+                Err(error) => tracing::debug!("the master does not answer: {error}"),
             }
-            // Ends with the process's last handle to what it tells.
-            if Arc::strong_count(&known) == 1 {
-                return;
-            }
-            std::thread::sleep(LOOK);
+            tokio::time::sleep(LOOK).await;
         }
     });
     Ok(())
+}
+
+/// Whether the master knows a subscriber of a topic. The publisher cannot say: it counts its own
+/// accepting task as one.
+async fn has_subscriber(
+    client: &reqwest::Client,
+    master: &str,
+    topic: &str,
+) -> anyhow::Result<bool> {
+    // Publishers, subscribers and services, each as topic and nodes.
+    type State = (i32, String, Vec<Vec<(String, Vec<String>)>>);
+    let body = serde_xmlrpc::request_to_string("getSystemState", vec![NODE.into()])?;
+    let answer = client.post(master).body(body).send().await?.text().await?;
+    let (_, _, state): State = serde_xmlrpc::response_from_str(&answer)?;
+    let subscribed = state.get(1).context("no subscribers in the master's answer")?;
+    Ok(subscribed.iter().any(|(name, nodes)| name == topic && !nodes.is_empty()))
 }
