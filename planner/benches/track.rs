@@ -103,7 +103,7 @@ fn case(
     turn: f64,
 ) -> Option<Case> {
     let cell = setting.cell();
-    let line = setting.surface.line(a, b, 0.006)?;
+    let line = setting.surface.line(a, b, 0.006, 0.07)?;
     let last = line.len() - 1;
     let edge = Edge {
         a: 0,
@@ -178,7 +178,7 @@ fn tool_path(bencher: Bencher<'_, '_>) {
 fn surface_line(bencher: Bencher<'_, '_>) {
     over(bencher, |s, c| {
         let last = c.edge.line.len() - 1;
-        s.surface.line(&c.edge.line[0], &c.edge.line[last], 0.006).is_some()
+        s.surface.line(&c.edge.line[0], &c.edge.line[last], 0.006, 0.07).is_some()
     });
 }
 

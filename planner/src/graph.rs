@@ -26,13 +26,15 @@ pub struct GraphConfig {
     pub radius: f64,
     /// Step of the surface line between two patches. \[m\]
     pub line_step: f64,
+    /// Shortest wave of the normal along that line: as long as the pad is wide. \[m\]
+    pub line_wave: f64,
     /// Redundancy values that are tried before an edge is given up.
     pub edge_samples: usize,
 }
 
 impl Default for GraphConfig {
     fn default() -> Self {
-        Self { neighbours: 8, radius: 0.10, line_step: 0.006, edge_samples: 100 }
+        Self { neighbours: 8, radius: 0.10, line_step: 0.006, line_wave: 0.07, edge_samples: 100 }
     }
 }
 
@@ -56,17 +58,17 @@ pub struct Edge {
 
 impl Edge {
     /// The edge along the surface line between two patches, whether or not the arm can follow it;
-    /// `None` where there is no line. `step` of the line in \[m\].
+    /// `None` where there is no line.
     #[must_use]
     pub fn between(
         surface: &Surface,
         patches: &[Patch],
         a: usize,
         b: usize,
-        step: f64,
+        config: &GraphConfig,
     ) -> Option<Self> {
         let end = |i: usize| SurfacePoint { point: patches[i].centre, normal: patches[i].normal };
-        let line = surface.line(&end(a), &end(b), step)?;
+        let line = surface.line(&end(a), &end(b), config.line_step, config.line_wave)?;
         let last = line.len() - 1;
         Some(Self {
             a,
@@ -163,7 +165,7 @@ pub fn build(
         .map(|&(a, b)| {
             let known = before.and_then(|graph| graph.known(a, b));
             let edge = known.unwrap_or_else(|| {
-                let edge = Edge::between(surface, patches, a, b, config.line_step)?;
+                let edge = Edge::between(surface, patches, a, b, config)?;
                 TURNS
                     .iter()
                     .map(|degrees| Edge { turn: f64::to_radians(*degrees), ..edge.clone() })
@@ -188,7 +190,7 @@ pub fn unchecked(
 ) -> Graph {
     let (mut edges, mut apart) = (Vec::new(), Vec::new());
     for (a, b) in neighbour_pairs(patches, reached, config) {
-        match Edge::between(surface, patches, a, b, config.line_step) {
+        match Edge::between(surface, patches, a, b, config) {
             Some(edge) => edges.push(edge),
             None => apart.push((a, b)),
         }

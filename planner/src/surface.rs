@@ -4,6 +4,8 @@
 //! [`Surface::line`] lays that chord onto the surface. The surface is a moving least squares fit
 //! whose weights fade out smoothly, so that points and normals along a line vary smoothly.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::fit::{HeightFit, PlaneFit, weight};
@@ -118,10 +120,17 @@ impl Surface {
 
     /// The line on the surface under the chord from `a` to `b`, at most about `step` apart, both
     /// ends exactly as given. Between them the ends' offsets from the surface fade out linearly, as
-    /// the plane of a patch does not quite meet the local surface. `None` where the chord leaves
-    /// the surface or the sheet.
+    /// the plane of a patch does not quite meet the local surface, and the normals change in waves
+    /// no shorter than `wave`: a pad lies on more of the surface than a fit sees. `None` where the
+    /// chord leaves the surface or the sheet. Lengths in \[m\].
     #[must_use]
-    pub fn line(&self, a: &SurfacePoint, b: &SurfacePoint, step: f64) -> Option<Vec<SurfacePoint>> {
+    pub fn line(
+        &self,
+        a: &SurfacePoint,
+        b: &SurfacePoint,
+        step: f64,
+        wave: f64,
+    ) -> Option<Vec<SurfacePoint>> {
         let chord = b.point - a.point;
         let pieces = (chord.norm() / step).ceil().max(1.0) as usize;
         let mut line = Vec::with_capacity(pieces + 1);
@@ -145,6 +154,7 @@ impl Surface {
         line[0] = *a;
         let last = line.len() - 1;
         line[last] = *b;
+        calm(&mut line, wave)?;
         Some(line)
     }
 
@@ -248,6 +258,33 @@ fn noise(grid: &Grid, points: &[Point3<f64>], normals: &[UnitVector3<f64>], radi
         .collect();
     off.sort_by(f64::total_cmp);
     1.48 * off.get(off.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Takes tremble out of the normals between a line's ends: of their deviation from the blend of the
+/// ends' normals only sine waves over the length are kept that are at least `shortest` long. An arm
+/// would follow every tremble with all its joints. `None` where a normal vanishes.
+fn calm(line: &mut [SurfacePoint], shortest: f64) -> Option<()> {
+    let mut way = vec![0.0];
+    for pair in line.windows(2) {
+        way.push(way[way.len() - 1] + (pair[1].point - pair[0].point).norm());
+    }
+    let (last, length) = (line.len() - 1, way[way.len() - 1]);
+    let ends = [*line[0].normal, *line[last].normal];
+    let straight = |i: usize| ends[0].lerp(&ends[1], way[i] / length);
+    let wave = |m: usize, i: usize| (PI * m as f64 * way[i] / length).sin();
+    let off: Vec<Vector3<f64>> = (0..=last).map(|i| *line[i].normal - straight(i)).collect();
+    // More waves than half the points are not there to be told apart.
+    let count = ((2.0 * length / shortest) as usize).min(last / 2);
+    // By the trapezoid rule, with waves and deviations that vanish at both ends.
+    let amplitude = |m: usize| -> Vector3<f64> {
+        (1..last).map(|i| off[i] * (wave(m, i) * (way[i + 1] - way[i - 1]) / length)).sum()
+    };
+    let kept: Vec<(usize, Vector3<f64>)> = (1..=count).map(|m| (m, amplitude(m))).collect();
+    for i in 1..last {
+        let waves: Vector3<f64> = kept.iter().map(|(m, a)| a * wave(*m, i)).sum();
+        line[i].normal = UnitVector3::try_new(straight(i) + waves, 1e-6)?;
+    }
+    Some(())
 }
 
 /// A direction between two; `None` if they are opposite.

@@ -23,7 +23,7 @@ fn example() -> ReportData {
     for a in 0..patches.len() {
         for b in a + 1..patches.len() {
             if (patches[a].centre - patches[b].centre).norm() < 0.07 {
-                edges.extend(surface.line(&end(a), &end(b), 0.01));
+                edges.extend(surface.line(&end(a), &end(b), 0.01, 0.07));
             }
         }
     }

@@ -15,6 +15,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const RADIUS: f64 = 0.12;
+/// Shortest wave of a line's normals: the width of the default pad.
+const WAVE: f64 = 0.07;
 
 /// The upper half of a cylinder along y, with noise along its normal and a wobble in the surface
 /// parameters, so that no grid direction is special.
@@ -68,7 +70,7 @@ proptest! {
         let b = on_cylinder((from + turn).clamp(0.4, 2.7), (y + along).clamp(-0.12, 0.12));
         prop_assume!((b.point - a.point).norm() > 0.02);
         let step = 0.005;
-        let line = surface.line(&a, &b, step).expect("the cylinder has no holes");
+        let line = surface.line(&a, &b, step, WAVE).expect("the cylinder has no holes");
         prop_assert_eq!(line[0], a);
         prop_assert_eq!(line[line.len() - 1], b);
         for pair in line.windows(2) {
@@ -111,12 +113,30 @@ proptest! {
 fn a_line_over_noisy_points_keeps_its_normals() {
     let surface = Surface::new(&cylinder(0.002));
     let (from, turn, y, along) = (2.5545, -0.7713, -0.0770, 0.0373);
-    let line = surface.line(&on_cylinder(from, y), &on_cylinder(from + turn, y + along), 0.005);
+    let line =
+        surface.line(&on_cylinder(from, y), &on_cylinder(from + turn, y + along), 0.005, WAVE);
     for found in line.expect("the cylinder has no holes") {
         let truth = Vector3::new(found.point.x, 0.0, found.point.z);
         let tilt = found.normal.angle(&truth);
         assert!(tilt < 0.1, "{tilt} rad at {}", found.point);
     }
+}
+
+/// Along a noisy line the normal turns as the cylinder does, without a tremble.
+#[test]
+fn the_normals_of_a_line_do_not_tremble() {
+    let surface = Surface::new(&cylinder(0.002));
+    let mut worst = 0.0f64;
+    for i in 0..20 {
+        let (from, y) = (0.8 + 0.06 * f64::from(i), 0.004 * f64::from(i) - 0.04);
+        let (a, b) = (on_cylinder(from, y), on_cylinder(from + 0.5, y + 0.02));
+        let line = surface.line(&a, &b, 0.005, WAVE).expect("the cylinder has no holes");
+        for three in line.windows(3) {
+            let [before, here, after] = [0, 1, 2].map(|k| *three[k].normal);
+            worst = worst.max((before + after - here * 2.0).norm());
+        }
+    }
+    assert!(worst < 0.01, "the normal turns by {worst} rad more at a point than at the last");
 }
 
 #[test]
@@ -150,10 +170,10 @@ fn there_is_no_line_over_a_hole_or_past_the_end() {
         spacing: scan.spacing,
     };
     let (a, b) = (on_cylinder(PI / 2.0, -0.05), on_cylinder(PI / 2.0, 0.05));
-    assert!(Surface::new(&scan).line(&a, &b, 0.005).is_some());
-    assert!(Surface::new(&holed).line(&a, &b, 0.005).is_none());
+    assert!(Surface::new(&scan).line(&a, &b, 0.005, WAVE).is_some());
+    assert!(Surface::new(&holed).line(&a, &b, 0.005, WAVE).is_none());
     let beyond = on_cylinder(PI / 2.0, 0.20);
-    assert!(Surface::new(&scan).line(&b, &beyond, 0.005).is_none());
+    assert!(Surface::new(&scan).line(&b, &beyond, 0.005, WAVE).is_none());
 }
 
 #[test]

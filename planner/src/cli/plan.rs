@@ -290,6 +290,7 @@ fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<J
     ensure!(args.start.len() <= MAX_DOF, "--start has more than {MAX_DOF} joints");
     let mut start: JointVector = [0.0; MAX_DOF];
     start[..args.start.len()].copy_from_slice(&args.start);
+    let line_wave = tool.width;
     Ok(Job {
         arm: args.robot.spec()?,
         tool,
@@ -307,6 +308,7 @@ fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<J
         graph: GraphConfig {
             neighbours: args.neighbours,
             radius: args.radius,
+            line_wave,
             ..GraphConfig::default()
         },
         formulation: FormulationConfig {

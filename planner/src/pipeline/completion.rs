@@ -181,7 +181,7 @@ impl<C: Cost> Trip<'_, C> {
     fn reach_from(&self, stop: usize) -> Option<(Sample, Motion<Leg>)> {
         let Shop { cell, job, surface, .. } = self.shop;
         let Visit { patch, sample: from, .. } = &self.visits[stop];
-        let edge = Edge::between(surface, self.patches, *patch, self.patch, job.graph.line_step)?;
+        let edge = Edge::between(surface, self.patches, *patch, self.patch, &job.graph)?;
         let heading = edge.heading_b + from.heading - edge.heading_a;
         let mut targets: Vec<Sample> = self.samples(heading);
         targets.retain(|to| to.branch == from.branch);
