@@ -76,8 +76,8 @@ struct RunArgs {
     /// the default scheduler.
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
     priority: u8,
-    /// Spin the last microseconds before each deadline, where SCHED_FIFO is granted. Default: 75,
-    /// or 0 on a single core.
+    /// Rehearse and spin the last microseconds before each deadline, where SCHED_FIFO is granted.
+    /// Default: 100, or 0 on a single core.
     #[arg(long, value_parser = clap::value_parser!(u32).range(0..=500))]
     spin_us: Option<u32>,
     /// Stop on the path when the joint state is older than this.
@@ -248,7 +248,7 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         bail!("--lost-ms must not be below --stale-ms");
     }
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let spin_us = args.spin_us.unwrap_or(if cores > 1 { 75 } else { 0 });
+    let spin_us = args.spin_us.unwrap_or(if cores > 1 { 100 } else { 0 });
     Ok(Config {
         robot_name: args.system.robot_name.clone(),
         ipc_root: args.system.ipc_root.clone(),

@@ -25,7 +25,7 @@ use crate::worker::Worker;
 const SHUTDOWN_TICKET: u64 = u64::MAX;
 /// Cycles that go on after a shutdown's stand-still, so that the endpoint hears the disable.
 const AFTERGLOW: u32 = 50;
-/// Cycles from the first Hold until the loop counts as armed: by then every port and page was used.
+/// Least cycles from the first Hold until the loop counts as armed: by then every port was used.
 const WARM_UP: u32 = 200;
 /// Highest `SCHED_FIFO` priority of worker and service: above what is not real-time, below what is.
 const HELPERS: u8 = 5;
@@ -136,8 +136,8 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
     let slots = Arc::new(Slots::default());
     let tape = config.record.as_ref().map(|_| Arc::new(Tape::default()));
     let recorder = recorder(config, tape.as_ref())?;
-    let done = AtomicBool::new(false);
-    let down = AtomicBool::new(false);
+    let signs = Signs::default();
+    let Signs { done, down, .. } = &signs;
     let open_ports = AtomicU32::new(0);
     thread::scope(|scope| {
         let worker = spawn(scope, "worker", || {
@@ -145,7 +145,7 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
             let ipc = open(config)?;
             let worker = Worker::open(&ipc, slots.clone(), rules, recorder)?;
             open_ports.fetch_add(1, Ordering::Release);
-            worker.run(&done);
+            worker.run(done);
             Ok(())
         })?;
         let service = spawn(scope, "service", || {
@@ -153,7 +153,7 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
             let ipc = open(config)?;
             let service = Service::open(&ipc, slots.clone(), arm.dof())?;
             open_ports.fetch_add(1, Ordering::Release);
-            service.run(&done);
+            service.run(done);
             Ok(())
         })?;
         // The loop comes last: whoever sees it hold can publish plans and command it.
@@ -172,12 +172,18 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
             if let Some(tape) = tape {
                 driver.record(tape);
             }
-            Ok(run_loop(driver, config, &down, &done))
+            Ok(run_loop(driver, config, &signs))
         })?;
 
         let mut asked = None;
         loop {
             thread::sleep(Duration::from_millis(5));
+            if signs.holds.load(Ordering::Acquire) && !signs.locked.load(Ordering::Relaxed) {
+                // The endpoint's memory too, which came after the loop's thread locked its own.
+                // What is denied here was denied there, which said so.
+                let _ = rt::lock_memory();
+                signs.locked.store(true, Ordering::Release);
+            }
             let ended = worker.is_finished() || service.is_finished() || looping.is_finished();
             if (stop.load(Ordering::Acquire) || ended) && asked.is_none() {
                 let ask = Ask { ticket: SHUTDOWN_TICKET, order: Order::Shutdown };
@@ -197,13 +203,21 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
     })
 }
 
+/// What the threads tell each other of a run's beginning and end.
+#[derive(Debug, Default)]
+struct Signs {
+    /// The loop has come to its first Hold.
+    holds: AtomicBool,
+    /// All memory that was there by then is locked.
+    locked: AtomicBool,
+    /// The loop has come to its end.
+    down: AtomicBool,
+    /// All threads shall end.
+    done: AtomicBool,
+}
+
 /// The real-time loop itself.
-fn run_loop<H: Hardware>(
-    mut driver: Driver<H>,
-    config: &Config,
-    down: &AtomicBool,
-    done: &AtomicBool,
-) -> Summary {
+fn run_loop<H: Hardware>(mut driver: Driver<H>, config: &Config, signs: &Signs) -> Summary {
     let (fifo, denied) = rt::become_real_time(config.priority, config.cpu);
     if !denied.is_empty() {
         tracing::warn!(
@@ -216,7 +230,7 @@ fn run_loop<H: Hardware>(
     let mut afterglow = 0;
     let mut armed: Option<(u64, i64)> = None;
     let mut summary = Summary::default();
-    while afterglow < AFTERGLOW && !done.load(Ordering::Acquire) {
+    while afterglow < AFTERGLOW && !signs.done.load(Ordering::Acquire) {
         let wake = grid.wait(|deadline_ns| driver.rehearse(deadline_ns));
         driver.cycle(wake);
         driver.account(wake);
@@ -227,7 +241,8 @@ fn run_loop<H: Hardware>(
         }
         if armed.is_none() && (held > 0 || driver.mode() == Mode::Hold) {
             held += 1;
-            if held == WARM_UP {
+            signs.holds.store(true, Ordering::Release);
+            if held >= WARM_UP && signs.locked.load(Ordering::Acquire) {
                 armed = Some((summary.cycles, faults()));
                 rt::arm(true);
             }
@@ -243,7 +258,7 @@ fn run_loop<H: Hardware>(
     summary.pool_calls = pool.pool_calls;
     summary.failures = driver.failures();
     (summary.lateness, summary.compute) = driver.histograms();
-    down.store(true, Ordering::Release);
+    signs.down.store(true, Ordering::Release);
     summary
 }
 

@@ -12,8 +12,8 @@ pub struct Grid {
     spin: u64,
 }
 
-/// Time before a deadline that is not given away. \[ns\]
-const RESERVE: u64 = 30_000;
+/// Time before a deadline that is not given away: longer than any rehearsal. \[ns\]
+const RESERVE: u64 = 15_000;
 
 /// One wake-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,10 +44,10 @@ impl Grid {
     }
 
     /// Sleeps, then spins, to the next deadline. Deadlines that have passed meanwhile are
-    /// skipped, on the same grid: no cycle is ever made up for. `early` is called with the
-    /// deadline where there is time for it between sleep and deadline.
+    /// skipped, on the same grid: no cycle is ever made up for. In place of spinning, `early` is
+    /// called with the deadline again and again, as long as there is time for it.
     #[inline]
-    pub fn wait(&mut self, early: impl FnOnce(u64)) -> Wake {
+    pub fn wait(&mut self, mut early: impl FnMut(u64)) -> Wake {
         let wake_at = self.next - self.spin;
         if now_ns() < wake_at {
             let at = Timespec {
@@ -58,7 +58,7 @@ impl Grid {
             while clock_nanosleep_absolute(ClockId::Monotonic, &at).is_err() {}
         }
         let mut now = now_ns();
-        if now + RESERVE < self.next {
+        while now + RESERVE < self.next {
             early(self.next);
             now = now_ns();
         }

@@ -58,11 +58,7 @@ impl fmt::Display for Denied {
 #[must_use]
 pub fn become_real_time(priority: u8, cpu: Option<usize>) -> (bool, Denied) {
     let mut denied = Denied::default();
-    // First everything that is there, code included, is brought in and locked; what is mapped
-    // later is locked as it is touched, as filling a whole segment at once would take long.
-    let later = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
-    let lock = mlockall(MlockAllFlags::CURRENT).and_then(|()| mlockall(later));
-    denied.note("locking memory", lock.map_err(io::Error::from));
+    denied.note("locking memory", lock_memory());
     if let Some(cpu) = cpu {
         let mut set = CpuSet::new();
         set.set(cpu);
@@ -76,6 +72,17 @@ pub fn become_real_time(priority: u8, cpu: Option<usize>) -> (bool, Denied) {
     }
     touch_stack();
     (fifo, denied)
+}
+
+/// Locks all memory of the process: what is there, code included, is brought in now, so that no
+/// thread faults on it later. What is mapped later is locked as it is touched, because filling a
+/// whole segment at once would take long.
+///
+/// # Errors
+/// Where the system's limit on locked memory is too low.
+pub fn lock_memory() -> io::Result<()> {
+    mlockall(MlockAllFlags::CURRENT)?;
+    Ok(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT)?)
 }
 
 /// Gives the calling thread `SCHED_FIFO` at `priority`, where that is not 0 and is granted.

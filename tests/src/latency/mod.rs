@@ -43,7 +43,7 @@ const PLAN_SECONDS: f64 = 0.04;
 /// How far their joints go. \[rad\]
 const PLAN_ANGLE: f64 = 0.005;
 /// How the bare loop waits: as the executor does by default. \[ns\]
-const SPIN_NS: u64 = 75_000;
+const SPIN_NS: u64 = 100_000;
 /// Highest SCHED_FIFO priority of the thread that publishes and commands.
 const PUBLISHER: u8 = 5;
 /// Time between two plans: a rest that lets the last one end, and a random part that spreads the
