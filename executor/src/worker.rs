@@ -96,15 +96,10 @@ impl<'a> Worker<'a> {
 
         let start = Instant::now();
         let admitted = admit(&header, &self.copy, self.held.as_ref(), &self.rules, now_ns());
-        let result = admitted.map(|plan| plan.checked(now_ns())).and_then(|plan| {
-            tracing::info!(
-                "plan {}: {} knots, {:.1} s, checked in {:.2} ms",
-                header.id,
-                plan.knots().len(),
-                plan.duration() * 1e-9,
-                start.elapsed().as_secs_f64() * 1e3,
-            );
-            let plan = Arc::new(plan);
+        let checked = start.elapsed();
+        let result = admitted.and_then(|plan| {
+            let (knots, seconds) = (plan.knots().len(), plan.duration() * 1e-9);
+            let plan = Arc::new(plan.checked(now_ns()));
             if let Some(recorder) = &mut self.recorder {
                 recorder.plan(&plan);
             }
@@ -113,7 +108,14 @@ impl<'a> Worker<'a> {
                     recorder.withdraw(&plan);
                 }
                 Rejection::new(Reason::QueueFull)
-            })
+            })?;
+            // Only now, as writing it takes longer than the loop takes to begin with the plan.
+            tracing::info!(
+                "plan {}: {knots} knots, {seconds:.1} s, checked in {:.2} ms",
+                header.id,
+                checked.as_secs_f64() * 1e3,
+            );
+            Ok(())
         });
         if let Err(why) = result {
             tracing::warn!("plan {} rejected: {why}", header.id);
