@@ -55,7 +55,8 @@ pub struct Guard {
     /// Each joint's bound on the acceleration of a stop, pause, resume or change of speed along
     /// the path, on top of the plan's own. \[rad/s²\]
     pub stop_acceleration: f64,
-    /// Acceleration of the motion from where the arm holds to a plan's first knot. \[rad/s²\]
+    /// Most acceleration of the motion from where the arm holds to a plan's first knot, see
+    /// [`Self::connector_acceleration`]. \[rad/s²\]
     pub connector_acceleration: f64,
     /// How far a plan's first knot may be from where the arm holds. \[rad\]
     pub start_tolerance: f64,
@@ -124,6 +125,13 @@ impl Guard {
     #[must_use]
     pub fn used(&self) -> &[JointGuard] {
         &self.joints[..self.dof.min(MAX_DOF)]
+    }
+
+    /// The acceleration of a joint on the way from where the arm holds to a plan's first knot.
+    /// \[rad/s²\] or \[m/s²\]
+    #[must_use]
+    pub fn connector_acceleration(&self, joint: usize) -> f64 {
+        self.connector_acceleration.min(self.joints[joint].limits.acceleration)
     }
 
     /// How far two velocities may differ and still count as one: what the stop acceleration

@@ -178,7 +178,8 @@ impl Path {
     }
 }
 
-/// A straight rest-to-rest motion: one trapezoid of speed shared by all joints.
+/// A straight rest-to-rest motion, as fast as each joint's velocity and acceleration allow: one
+/// trapezoid of speed shared by all joints. Some 50 operations, so it is made where it is needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Connector {
     from: Joints,
@@ -200,19 +201,19 @@ impl Connector {
 
     fn new(from: &Joints, to: &Joints, guard: &Guard) -> Self {
         let mut way = 0.0f64;
-        let mut share_speed = f64::INFINITY;
+        let (mut speed, mut acceleration) = (f64::INFINITY, f64::INFINITY);
         for (j, bound) in guard.used().iter().enumerate() {
             let d = (to[j] - from[j]).abs();
             way = way.max(d);
             if d > 0.0 {
-                share_speed = share_speed.min(bound.velocity() / d);
+                speed = speed.min(bound.velocity() / d);
+                acceleration = acceleration.min(guard.connector_acceleration(j) / d);
             }
         }
-        if !(way > 0.0) || !(share_speed > 0.0) {
+        if !(way > 0.0) || !(speed > 0.0) || !(acceleration > 0.0) {
             return Self { from: *from, ..Self::none(to) };
         }
-        let acceleration = guard.connector_acceleration / way;
-        let rise = (share_speed / acceleration).min(acceleration.sqrt().recip());
+        let rise = (speed / acceleration).min(acceleration.sqrt().recip());
         let top = acceleration * rise;
         // The way is 1: a triangle covers top · rise, the rest is at top speed.
         let cruise = (1.0 - top * rise).max(0.0) / top;
@@ -264,4 +265,78 @@ fn shifted(q: &Joints, shift: &Joints) -> Joints {
         sum[j] += shift[j];
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rsruckig::prelude::{
+        DataArrayOrVec, InputParameter, Ruckig, Synchronization, ThrowErrorHandler, Trajectory,
+    };
+
+    use super::*;
+    use crate::guard::tests::pr2;
+
+    const DOF: usize = 7;
+
+    /// How long the best motion between two stand-stills takes by Ruckig. \[s\]
+    fn best(from: &Joints, to: &Joints, guard: &Guard, together: Synchronization) -> f64 {
+        let mut input = InputParameter::<DOF>::new(None);
+        let each = |f: &dyn Fn(usize) -> f64| DataArrayOrVec::Stack(std::array::from_fn(f));
+        input.current_position = each(&|j| from[j]);
+        input.target_position = each(&|j| to[j]);
+        input.max_velocity = each(&|j| guard.joints[j].velocity());
+        input.max_acceleration = each(&|j| guard.connector_acceleration(j));
+        input.max_jerk = each(&|_| f64::INFINITY);
+        input.synchronization = together;
+        let mut trajectory = Trajectory::new(None);
+        let mut ruckig = Ruckig::<DOF, ThrowErrorHandler>::new(None, 0.001);
+        ruckig.calculate(&input, &mut trajectory).expect("a motion");
+        trajectory.get_duration()
+    }
+
+    proptest! {
+        /// Within the start tolerance a connector is as fast as the best that any generator could
+        /// make; further away it keeps to the line and to every bound.
+        #[test]
+        fn a_connector_is_the_best_straight_motion(
+            way in prop::array::uniform7(-1.0..1.0f64),
+            far in any::<bool>(),
+            weak in 0..DOF,
+            share in 0.1..1.0f64,
+        ) {
+            let mut guard = pr2();
+            guard.joints[weak].limits.acceleration *= share;
+            let from = [0.1; MAX_DOF];
+            let reach = if far { 1.0 } else { guard.start_tolerance };
+            let mut to = from;
+            for j in 0..DOF {
+                to[j] += reach * way[j];
+            }
+            let connector = Connector::new(&from, &to, &guard);
+            let seconds = connector.duration * 1e-9;
+            let phase = best(&from, &to, &guard, Synchronization::Phase);
+            prop_assert!(seconds >= phase - 1e-8, "{seconds} against {phase}");
+            if !far {
+                prop_assert!(seconds <= phase + 1e-8, "{seconds} against {phase}");
+            }
+            let cycle = guard.period_ns as f64;
+            let cycles = (connector.duration / cycle).ceil() as usize;
+            let mut last = connector.sample(0.0, 1.0);
+            prop_assert_eq!(last.q, from);
+            for k in 1..=cycles {
+                let next = connector.sample(k as f64 * cycle, 1.0);
+                let share = (next.q[0] - from[0]) / (to[0] - from[0]);
+                for j in 0..DOF {
+                    let line = from[j] + share * (to[j] - from[j]);
+                    prop_assert!((next.q[j] - line).abs() < 1e-9);
+                    prop_assert!(next.v[j].abs() <= guard.joints[j].velocity() * (1.0 + 1e-9));
+                    let rise = (next.v[j] - last.v[j]).abs() / guard.period();
+                    prop_assert!(rise <= guard.connector_acceleration(j) * (1.0 + 1e-6), "{rise}");
+                }
+                last = next;
+            }
+            prop_assert_eq!(last.q, to);
+        }
+    }
 }

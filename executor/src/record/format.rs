@@ -15,7 +15,7 @@ use crate::interpolate::PlanKnot;
 use crate::{Joints, MAX_DOF};
 
 /// The first bytes of a recording; the digit is the version.
-pub(crate) const MAGIC: &[u8; 8] = b"NSWREC2\n";
+pub(crate) const MAGIC: &[u8; 8] = b"NSWREC3\n";
 
 /// What a record holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
