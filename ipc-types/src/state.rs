@@ -12,7 +12,8 @@ pub mod status {
     pub const CALIBRATED: u32 = 1;
     /// The motors are halted (run stop, communication error, halt service).
     pub const HALTED: u32 = 1 << 1;
-    /// The endpoint stopped by itself because setpoints ceased.
+    /// The endpoint follows no setpoint: they ceased and it stopped by itself, or those that come
+    /// begin too far from where it measures the arm.
     pub const SETPOINT_TIMEOUT: u32 = 1 << 2;
     /// An endpoint error that latches until it is reset there.
     pub const ERROR: u32 = 1 << 3;

@@ -59,9 +59,12 @@ pub struct Endpoint {
     held: Vec<f64>,
     /// Whether the arm follows setpoints. It begins to with one that is where the arm is.
     following: bool,
+    /// Setpoints ceased, or those that come begin too far from the arm.
     timed_out: bool,
     disabled: bool,
-    last: Option<Received>,
+    /// The deadline of the last sound setpoint. \[ns\]
+    deadline_ns: Option<u64>,
+    in_force: Option<Received>,
     frozen: Option<JointVector>,
     jumped: bool,
     /// What the last state said, the last finite one.
@@ -73,7 +76,6 @@ pub struct Endpoint {
 #[derive(Clone, Copy, Debug)]
 struct Received {
     sequence: u64,
-    deadline_ns: u64,
     received_ns: u64,
 }
 
@@ -104,7 +106,8 @@ impl Endpoint {
             following: false,
             timed_out: false,
             disabled: false,
-            last: None,
+            deadline_ns: None,
+            in_force: None,
             frozen: None,
             jumped: false,
             reported: initial,
@@ -131,7 +134,7 @@ impl Endpoint {
         self.plant.measured()
     }
 
-    /// Whether it stands because setpoints ceased.
+    /// Whether it stands because setpoints ceased, or begin too far from the arm.
     #[must_use]
     pub fn is_timed_out(&self) -> bool {
         self.timed_out
@@ -202,9 +205,9 @@ impl Endpoint {
         let mut state = <JointStates as bytemuck::Zeroable>::zeroed();
         state.sequence = self.sequence;
         state.stamp_ns = stamp_ns;
-        if let Some(last) = self.last {
-            state.setpoint_sequence = last.sequence;
-            state.setpoint_received_ns = last.received_ns;
+        if let Some(setpoint) = self.in_force {
+            state.setpoint_sequence = setpoint.sequence;
+            state.setpoint_received_ns = setpoint.received_ns;
         }
         state.positions[..self.dof].copy_from_slice(&positions[..self.dof]);
         state.velocities[..self.dof].copy_from_slice(&velocities[..self.dof]);
@@ -224,8 +227,8 @@ impl Endpoint {
 
     /// Stops by itself when the last setpoint's deadline and the grace have passed.
     fn watch(&mut self, now_ns: u64) {
-        let Some(last) = self.last else { return };
-        let end_ns = last.deadline_ns.saturating_add(self.behaviour.rules.session_timeout_ns);
+        let Some(deadline_ns) = self.deadline_ns else { return };
+        let end_ns = deadline_ns.saturating_add(self.behaviour.rules.session_timeout_ns);
         if self.timed_out || now_ns <= end_ns {
             return;
         }
@@ -244,32 +247,33 @@ impl Endpoint {
             self.deeds.refused += 1;
             return;
         }
-        let (sequence, deadline_ns) = (setpoint.sequence, setpoint.deadline_ns);
-        self.last = Some(Received { sequence, deadline_ns, received_ns: now_ns });
-        self.timed_out = false;
+        self.deadline_ns = Some(setpoint.deadline_ns);
         if setpoint.disable != 0 && !self.disabled {
             self.deeds.disabled += 1;
             self.plant.release();
         }
         self.disabled = setpoint.disable != 0;
-        if self.disabled
-            || self.is_active(FaultKind::Halt, now_ns)
-            || self.is_active(FaultKind::Deaf, now_ns)
-        {
-            self.following = false;
+        let able = !self.disabled
+            && !self.is_active(FaultKind::Halt, now_ns)
+            && !self.is_active(FaultKind::Deaf, now_ns);
+        if able && !self.following && !self.is_near(setpoint) {
+            self.deeds.refused += 1;
+            self.timed_out = true;
             return;
         }
-        if !self.following {
-            let measured = self.plant.measured();
-            let off = |j: usize| (setpoint.positions[j] - measured[j]).abs();
-            let tolerance = self.behaviour.rules.start_tolerance;
-            if (0..self.dof).any(|j| off(j) > tolerance) {
-                self.deeds.refused += 1;
-                return;
-            }
-            self.following = true;
+        self.following = able;
+        self.timed_out = false;
+        self.in_force = Some(Received { sequence: setpoint.sequence, received_ns: now_ns });
+        if able {
+            self.plant.follow(setpoint);
         }
-        self.plant.follow(setpoint);
+    }
+
+    /// Whether the arm is where a setpoint wants it.
+    fn is_near(&self, setpoint: &Setpoint) -> bool {
+        let measured = self.plant.measured();
+        let tolerance = self.behaviour.rules.start_tolerance;
+        (0..self.dof).all(|j| (setpoint.positions[j] - measured[j]).abs() <= tolerance)
     }
 }
 
@@ -340,6 +344,7 @@ mod tests {
         rig.moved -= 0.5;
         rig.send(501 * MS);
         assert_eq!(rig.endpoint.deeds().refused, 1);
+        assert!(rig.endpoint.is_timed_out());
         rig.moved += 0.5;
         rig.send(502 * MS);
         assert_eq!(rig.endpoint.deeds().refused, 1);

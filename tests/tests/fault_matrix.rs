@@ -6,7 +6,7 @@ use std::time::Duration;
 use nullsweep_executor::cycle::Order;
 use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanId};
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
-use nullsweep_tests::endpoint::{Behaviour, Fidelity};
+use nullsweep_tests::endpoint::{Behaviour, Endpoint, Fidelity};
 use nullsweep_tests::fault::FaultKind;
 use nullsweep_tests::loopback::Loopback;
 use nullsweep_tests::sketch::{Sketch, swung};
@@ -156,4 +156,40 @@ fn a_weight_does_not_sink_while_a_past_halt_is_latched() {
     let after = *system.endpoint.positions();
     // The motors are on again: what the arm sank by when they were off is all it may sink.
     assert!((after[1] - before[1]).abs() < 0.01, "it sank by {} rad", after[1] - before[1]);
+}
+
+/// The endpoint dies and comes back with an arm that stands elsewhere, soon or late: it is met where
+/// the arm is, follows again, and nothing jumps.
+#[test]
+fn a_restarted_endpoint_is_met_where_its_arm_stands() {
+    for fidelity in [Fidelity::Servo, Fidelity::Mechanism] {
+        for &mode in Mode::ALL {
+            for (silent, off) in [(5, 0.0), (5, 0.01), (50, 0.05), (400, 0.05), (400, 0.3)] {
+                let (mut system, plan) = in_mode(mode, fidelity);
+                let now = system.now_ns();
+                system.endpoint.play(FaultKind::Stale, None, now);
+                system.run(silent);
+                let mut at = *system.endpoint.positions();
+                at[0] += off;
+                at[3] -= off;
+                let behaviour = Behaviour { fidelity, ..Behaviour::default() };
+                let now = system.now_ns();
+                system.endpoint =
+                    Endpoint::new(&system.arm, at, behaviour, now).expect("a PR2 arm");
+                system.run(800);
+                let name = format!("{silent} ms of silence, {off} rad");
+                let commanded = system.commanded();
+                let there = *system.endpoint.positions();
+                for j in 0..system.arm.dof() {
+                    let apart = (commanded[j] - there[j]).abs();
+                    assert!(apart < 0.05, "{name} in {mode}: joint {j} is {apart} off");
+                }
+                assert!(!system.endpoint.is_timed_out(), "{name} in {mode}: it follows again");
+                let story = plan.map_or_else(Vec::new, |p| system.story(p));
+                let ends = story.iter().filter(|e| e.kind == EventKind::Aborted).count();
+                assert!(ends <= 1, "{name} in {mode}: {story:?}");
+                recovers(&mut system, &name, mode);
+            }
+        }
+    }
 }

@@ -96,10 +96,12 @@ impl Watch {
         }
     }
 
-    /// Whether the endpoint follows no setpoint now, by its own word.
+    /// Whether the endpoint follows no setpoint now, by its own word: it is not able to, it has
+    /// stopped by itself, or it has begun anew and had none yet that is near enough.
     fn is_limp(&self) -> bool {
-        let timeout = |m: Measured| m.status & status::SETPOINT_TIMEOUT != 0;
-        self.endpoint().is_some() || self.newest.is_some_and(timeout)
+        let idle =
+            |m: Measured| m.status & status::SETPOINT_TIMEOUT != 0 || m.setpoint_sequence == 0;
+        self.endpoint().is_some() || self.newest.is_some_and(idle)
     }
 
     /// Counts cycles in windows; whether the mean over all windows is too low.
@@ -136,7 +138,7 @@ impl State {
         let low_rate = self.watch.rate_is_low(now_ns, guard);
         match self.mode {
             Mode::Init => self.initialise(bad, now_ns, guard),
-            Mode::Fault => self.follow_if_limp(guard),
+            Mode::Fault => self.follow_if_limp(guard, out),
             Mode::Hold | Mode::Executing | Mode::Paused | Mode::Stopping => {
                 let age = self.watch.age(now_ns);
                 let fault = bad
@@ -156,7 +158,7 @@ impl State {
                 {
                     self.lapse(Fault::HeldJoint, Reason::HeldJoint, out);
                 }
-                self.follow_if_limp(guard);
+                self.follow_if_limp(guard, out);
             }
         }
     }
@@ -218,7 +220,8 @@ impl State {
         }
     }
 
-    fn follow_if_limp(&mut self, guard: &Guard) {
+    /// Brings the command to where an arm is that does not follow it, so that it can begin to.
+    fn follow_if_limp(&mut self, guard: &Guard, out: &mut Output) {
         let limp = match self.mode {
             // A fault stays latched when its cause is gone: with the motors on again the command
             // must stand, or a loaded arm sinks after its own sag.
@@ -226,6 +229,8 @@ impl State {
             _ => self.is_off(),
         };
         if limp && let Some(measured) = self.watch.newest {
+            // Nothing brakes on the path any more.
+            self.drop_path(out);
             self.creep(&measured.q, guard);
         }
     }

@@ -16,8 +16,12 @@ pub use verdict::{Kind, PlanRun, Verdict, Violation};
 pub struct Rules {
     /// Period that one sequence number stands for. \[ns\]
     pub period_ns: u64,
-    /// How far the first setpoint of a session may be from the measured position. \[rad\] or \[m\]
+    /// How far an executor's first setpoint, and the first one after a fault, may be from the
+    /// measured position. \[rad\] or \[m\]
     pub start_tolerance: f64,
+    /// How soon an executor that ran before this endpoint must have heard where the arm is: then
+    /// its setpoints are within the same tolerance, or it says that it waits for a reset. \[ns\]
+    pub meet_within_ns: u64,
     /// Silence after a deadline that ends a session. \[ns\]
     pub session_timeout_ns: u64,
     /// Samples that the reader's buffer holds: a pass that takes out this many may have lost some.
@@ -34,6 +38,7 @@ impl Default for Rules {
         Self {
             period_ns: 1_000_000,
             start_tolerance: 0.02,
+            meet_within_ns: 100_000_000,
             session_timeout_ns: 20_000_000,
             buffer: service::SETPOINT.buffer,
             rounding: 1e-6,
@@ -48,6 +53,8 @@ pub struct Judge {
     arm: Arm,
     rules: Rules,
     last: Option<Last>,
+    /// Since when an executor that ran before this endpoint has not been seen near the arm. \[ns\]
+    unmet_since_ns: Option<u64>,
     verdict: Verdict,
 }
 
@@ -82,7 +89,7 @@ impl Judge {
             least_margin: f64::INFINITY,
             plans: Vec::new(),
         };
-        Self { arm: arm.clone(), rules, last: None, verdict }
+        Self { arm: arm.clone(), rules, last: None, unmet_since_ns: None, verdict }
     }
 
     /// What was found so far.
@@ -128,7 +135,11 @@ impl Judge {
         let Some(last) = self.continued(s) else {
             self.verdict.sessions += 1;
             self.verdict.plans.push(PlanRun::new(s));
-            self.check_start(s, &positions, measured);
+            if s.sequence == 1 {
+                self.check_start(s, &positions, measured);
+            } else {
+                self.unmet_since_ns = Some(s.stamp_ns);
+            }
             self.check_limits(s, &positions, &JointVector::default(), &feed_forward, measured);
             return self.keep(s, mode, positions, JointVector::default());
         };
@@ -157,7 +168,19 @@ impl Judge {
             std::array::from_fn(|j| (positions[j] - last.positions[j]) / elapsed);
         // When the executor leaves a fault, it begins again from where the arm was measured, and
         // gets there without a jump.
-        if last.mode.is_some_and(is_idle) && !mode.is_some_and(is_idle) {
+        let idle = mode.is_some_and(is_idle);
+        let leaves = last.mode.is_some_and(is_idle) && !idle;
+        if let Some(since_ns) = self.unmet_since_ns {
+            let met = self.worst_start(&positions, measured).is_none();
+            let late = !idle && s.stamp_ns > since_ns + self.rules.meet_within_ns;
+            if met || leaves || late {
+                self.unmet_since_ns = None;
+            }
+            if late && !leaves {
+                self.check_start(s, &positions, measured);
+            }
+        }
+        if leaves {
             self.check_start(s, &positions, measured);
         }
         let ratio = self.check_steps(s, &rates, elapsed);
@@ -174,12 +197,17 @@ impl Judge {
     }
 
     fn check_start(&mut self, s: &Setpoint, positions: &JointVector, measured: &JointVector) {
-        for j in 0..self.arm.dof() {
-            let off = (positions[j] - measured[j]).abs();
-            if off > self.rules.start_tolerance {
-                self.violate(Kind::Jump, s, Some(j), off, self.rules.start_tolerance);
-            }
+        if let Some((j, off)) = self.worst_start(positions, measured) {
+            self.violate(Kind::Jump, s, Some(j), off, self.rules.start_tolerance);
         }
+    }
+
+    /// The joint that is farthest from where it is measured, if that is too far to begin.
+    fn worst_start(&self, q: &JointVector, measured: &JointVector) -> Option<(usize, f64)> {
+        (0..self.arm.dof())
+            .map(|j| (j, (q[j] - measured[j]).abs()))
+            .filter(|(_, off)| *off > self.rules.start_tolerance)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     fn check_steps(&mut self, s: &Setpoint, rates: &JointVector, elapsed: f64) -> f64 {

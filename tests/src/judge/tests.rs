@@ -172,6 +172,41 @@ fn a_session_starts_where_the_arm_is() {
 }
 
 #[test]
+fn an_executor_that_was_there_before_must_come_to_the_arm() {
+    // Two joints off for 50 ms: it may not have heard yet. For longer: it does not listen.
+    let off = |count: u64, mode: Mode| {
+        let mut s = stream(&arm(), count, 0.0);
+        for s in &mut s {
+            s.sequence += 5000;
+            s.mode = mode.wire();
+            s.positions[1] += 0.03;
+            s.positions[2] += 0.02;
+        }
+        s
+    };
+    for mode in [Mode::Hold, Mode::Executing, Mode::Stopping] {
+        assert!(judged(&off(50, mode), 1).is_clean());
+        only(&judged(&off(300, mode), 1), Kind::Jump, 1);
+    }
+    // While it waits for a reset it may be anywhere, but not when it no longer does.
+    let mut s = off(300, Mode::Fault);
+    assert!(judged(&s, 1).is_clean());
+    for s in &mut s[10..] {
+        s.mode = Mode::Hold.wire();
+    }
+    only(&judged(&s, 1), Kind::Jump, 1);
+    // It came to the arm: what it does then is motion.
+    let mut s = off(300, Mode::Hold);
+    for (k, s) in s.iter_mut().enumerate() {
+        s.positions[1] -= 1e-3 * (k as f64).min(30.0);
+        s.positions[2] -= 1e-3 * (k as f64).min(20.0);
+        s.positions[0] += 2e-3 * (k as f64 - 150.0).clamp(0.0, 50.0);
+    }
+    let verdict = judged(&s, 1);
+    assert!(verdict.is_clean(), "{:?}", verdict.first);
+}
+
+#[test]
 fn plans_and_lateness_are_followed() {
     let mut s = stream(&arm(), 30, 0.2);
     for (k, s) in s.iter_mut().enumerate() {

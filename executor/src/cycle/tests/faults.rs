@@ -176,3 +176,54 @@ fn a_lag_that_the_endpoint_reports_is_no_following_error() {
     sim.run_until(Mode::Hold, 400);
     assert_eq!(sim.story(1), [Accepted, Started, Finished]);
 }
+
+/// After a loss the endpoint may be another one, or have stopped by itself: while it says that it
+/// follows nothing, the command goes to where the arm is, so that it can begin to. While it
+/// follows, the command stands.
+#[test]
+fn an_endpoint_that_follows_nothing_is_met_where_the_arm_is() {
+    type Says = fn(Measured) -> Measured;
+    let cases: [(&str, Says, bool); 4] = [
+        ("stopped", |m| Measured { status: m.status | status::SETPOINT_TIMEOUT, ..m }, true),
+        ("begun anew", |m| Measured { setpoint_sequence: 0, ..m }, true),
+        ("halted", |m| Measured { status: m.status | status::HALTED, ..m }, true),
+        ("follows", |m| m, false),
+    ];
+    for (name, says, comes) in cases {
+        for mode in [Mode::Hold, Mode::Executing, Mode::Paused, Mode::Stopping] {
+            let mut sim = in_mode(mode);
+            sim.speaks = false;
+            sim.run(400);
+            assert_eq!(sim.state.snapshot().fault, Fault::CommunicationLost, "{name} in {mode}");
+            let stood = sim.last.unwrap();
+            let elsewhere = moved(moved(stood, 0, 0.05), 3, -0.08);
+            for _ in 0..200 {
+                let measured = says(Measured { q: elsewhere, ..sim.measured() });
+                sim.tick_with(Some(measured), None, None);
+            }
+            let commanded = sim.last.unwrap();
+            assert_eq!(commanded, if comes { elsewhere } else { stood }, "{name} in {mode}");
+            assert_eq!(sim.mode(), Mode::Fault, "{name} in {mode}: it is latched");
+            assert_eq!(sim.state.snapshot().fault, Fault::CommunicationLost);
+        }
+    }
+}
+
+/// An arm that brakes on its path and then follows nothing any more: the brake is over, and the
+/// command goes to where the arm is without a jump (`Sim` judges that).
+#[test]
+fn what_follows_nothing_needs_no_brake() {
+    for bit in [status::HALTED, status::SETPOINT_TIMEOUT] {
+        let mut sim = in_mode(Mode::Executing);
+        let nan = Measured { q: moved(sim.arm, 3, f64::NAN), ..sim.measured() };
+        sim.tick_with(Some(nan), None, None);
+        assert_eq!((sim.mode(), sim.state.snapshot().fault), (Mode::Fault, Fault::NotFinite));
+        let at = moved(sim.arm, 0, -0.05);
+        for _ in 0..200 {
+            let m = sim.measured();
+            sim.tick_with(Some(Measured { q: at, status: m.status | bit, ..m }), None, None);
+        }
+        assert_eq!(sim.state.snapshot().fault, Fault::NotFinite, "no step, no limit was broken");
+        assert_eq!(sim.last, Some(at));
+    }
+}
