@@ -55,6 +55,22 @@ pub struct Plan {
     pub surface: Vec<SurfaceSample>,
     /// For a plan that goes on from another one: where.
     pub continues: Option<Continues>,
+    /// What was followed before its first knot, oldest first: of each plan that led to this one the
+    /// part up to where the next took over.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub past: Vec<Stretch>,
+}
+
+/// A part of a plan that was followed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stretch {
+    /// The tool that it was followed with.
+    pub tool: Tool,
+    /// How the joints moved between knots.
+    pub profile: Profile,
+    /// Its knots.
+    pub knots: Vec<PlanKnot>,
 }
 
 /// A joint that the plan takes as fixed.
@@ -217,6 +233,14 @@ impl Plan {
             Profile::Velocity => Curve::line(&a.q, &b.q, seconds),
             Profile::Acceleration => Curve::cubic((&a.q, &a.v), (&b.q, &b.v), seconds),
         }
+    }
+
+    /// All that has been followed when this plan has come to a knot: its past, and itself so far.
+    #[must_use]
+    pub fn followed(&self, knot: usize) -> Vec<Stretch> {
+        let knots = self.knots[..self.knots.len().min(knot + 1)].to_vec();
+        let last = Stretch { tool: self.tool.clone(), profile: self.profile, knots };
+        self.past.iter().cloned().chain([last]).collect()
     }
 
     /// Whether the pad is on the surface in the segment that ends in a knot.

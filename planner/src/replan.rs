@@ -255,6 +255,7 @@ mod tests {
             patches: Vec::new(),
             surface: Vec::new(),
             continues: None,
+            past: Vec::new(),
         }
     }
 

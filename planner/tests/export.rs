@@ -31,6 +31,7 @@ fn plan(profile: Profile) -> Plan {
         patches: Vec::new(),
         surface: Vec::new(),
         continues: None,
+        past: Vec::new(),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use nullsweep_planner::collision::{Obstacle, Options};
 use nullsweep_planner::cost::CostKind;
+use nullsweep_planner::coverage;
 use nullsweep_planner::formulation::{FormulationConfig, Method};
 use nullsweep_planner::graph::GraphConfig;
 use nullsweep_planner::patches::PatchConfig;
@@ -13,6 +14,7 @@ use nullsweep_planner::simulate;
 use nullsweep_planner::stance::Stance;
 use nullsweep_planner::timing::Profile;
 use nullsweep_planner::tool::Tool;
+use nullsweep_planner::verify;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 
 fn seat() -> Region {
@@ -94,6 +96,28 @@ fn a_plan_goes_on_from_a_knot_and_survives_its_file() {
         Some((digest, knot as u32))
     );
     assert!(second.plan.knots.len() < first.plan.knots.len(), "only what is left is swept");
+
+    // The third one leaves out what both have swept.
+    let knot = second.plan.knots.len() / 3;
+    let after = Some(After { plan: second.plan.clone(), knot, held: None, again: false });
+    let third = plan_on(2, &seat, &Job { after, ..job(&seat, Method::Tsp, CostKind::Effort) });
+    check(&third);
+    assert_eq!(third.plan.past.len(), 2);
+    let visited = |outcome: &Outcome| -> Vec<usize> {
+        outcome.plan.knots.iter().filter_map(|k| k.patch).map(|p| p as usize).collect()
+    };
+    for (plan, until) in [(&first.plan, first.plan.knots.len() / 3), (&second.plan, knot)] {
+        let mut followed = plan.clone();
+        followed.knots.truncate(until + 1);
+        let poses = verify::contact_motion(&followed, &third.arm);
+        let swept = coverage::swept(&third.scan, &poses, &followed.tool);
+        for patch in visited(&third) {
+            let points = &third.patches[patch].points;
+            let again = points.iter().filter(|&&i| swept[i as usize]).count();
+            assert!((again as f64) < 0.9 * points.len() as f64, "patch {patch} was swept before");
+        }
+    }
+    assert!(visited(&third).len() < visited(&second).len());
 
     std::fs::write(&path, "{\"format\": 1}").expect("written");
     assert!(matches!(Plan::read(&path), Err(PlanError::Parse { .. })));

@@ -86,6 +86,7 @@ mod tests {
             patches: Vec::new(),
             surface,
             continues: None,
+            past: Vec::new(),
         }
     }
 

@@ -303,6 +303,11 @@ impl Shop<'_> {
                 .as_ref()
                 .filter(|a| a.held.is_none())
                 .map(|a| Continues { digest: a.plan.digest(), knot: a.knot as u32 }),
+            past: job
+                .after
+                .as_ref()
+                .filter(|a| !a.again)
+                .map_or_else(Vec::new, |a| a.plan.followed(a.knot)),
         }
     }
 }

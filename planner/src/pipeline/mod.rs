@@ -18,7 +18,7 @@ use crate::coverage;
 use crate::formulation::{FormulationConfig, FormulationError, Method};
 use crate::graph::{Graph, GraphConfig};
 use crate::patches::{self, Patch, PatchConfig};
-use crate::plan::Plan;
+use crate::plan::{Plan, Stretch};
 use crate::progress::Progress;
 use crate::reach::{Sample, Workcell, reach};
 use crate::scan::Scan;
@@ -90,7 +90,8 @@ pub struct After {
     /// Where the arm was stopped past that knot and is held: then the plan starts there. \[rad\] or
     /// \[m\]
     pub held: Option<JointVector>,
-    /// Whether patches that the other plan has swept by then are swept again.
+    /// Whether patches that the other plan, and those that led to it, have swept by then are swept
+    /// again.
     pub again: bool,
 }
 
@@ -290,7 +291,7 @@ pub fn run(
         || Ok(vec![false; scan.points.len()]),
         |after| {
             let knot = rest.as_ref().map_or(after.knot, |rest| rest.at);
-            swept_before(&After { knot, ..after.clone() }, &arm, &scan)
+            swept_before(&after.plan, knot, &arm, &scan)
         },
     )?;
     progress.stage("reach", Some(patches.len()));
@@ -398,16 +399,26 @@ impl Clock {
     }
 }
 
-/// Which points the other plan has swept up to its knot.
-fn swept_before(after: &After, arm: &Arm, scan: &Scan) -> Result<Vec<bool>, PipelineError> {
-    let knots = after.plan.knots.len();
-    let mut prefix = after.plan.clone();
-    if after.knot >= knots {
-        return Err(PipelineError::NoSuchKnot { knots, knot: after.knot });
+/// Which points the other plan, and those that led to it, have swept up to its knot.
+fn swept_before(
+    plan: &Plan,
+    knot: usize,
+    arm: &Arm,
+    scan: &Scan,
+) -> Result<Vec<bool>, PipelineError> {
+    let knots = plan.knots.len();
+    if knot >= knots {
+        return Err(PipelineError::NoSuchKnot { knots, knot });
     }
-    prefix.knots.truncate(after.knot + 1);
-    let poses = verify::contact_motion(&prefix, arm);
-    Ok(coverage::swept(scan, &poses, &after.plan.tool))
+    let mut swept = vec![false; scan.points.len()];
+    for Stretch { tool, profile, knots } in plan.followed(knot) {
+        let part = Plan { tool, profile, knots, ..plan.clone() };
+        let poses = verify::contact_motion(&part, arm);
+        for (before, now) in swept.iter_mut().zip(coverage::swept(scan, &poses, &part.tool)) {
+            *before |= now;
+        }
+    }
+    Ok(swept)
 }
 
 /// Share of a patch's points from which on it counts as swept.

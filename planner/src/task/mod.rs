@@ -290,6 +290,7 @@ fn assemble(
             })
             .collect(),
         continues: None,
+        past: Vec::new(),
     }
 }
 

@@ -50,6 +50,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         patches: Vec::new(),
         surface: vec![sample(0.0, true), sample(5.0, false)],
         continues: None,
+        past: Vec::new(),
     }
 }
 
