@@ -6,13 +6,13 @@ use std::time::Duration;
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The motors halt: brakes on, status bit set.
+    /// The motors halt, as by the run stop: brakes on, status bit set.
     Halt,
     /// The endpoint reports an error.
     Error,
     /// The joints are no longer calibrated.
     Uncalibrated,
-    /// No state is sent.
+    /// No state is sent; from `0s` on, an endpoint that comes late.
     Stale,
     /// States go on, but the joints in them stand still.
     Freeze,

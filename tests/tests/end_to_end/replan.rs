@@ -3,8 +3,8 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use nullsweep_ipc_types::{EventKind, PlanEvent, Reason};
-use nullsweep_planner::plan::Plan;
+use nullsweep_ipc_types::{CommandKind, EventKind, PlanEvent, Reason, Telemetry, Verdict};
+use nullsweep_planner::plan::{Plan, PlanKnot};
 use nullsweep_tests::stage::{Part, Stage};
 use nullsweep_tests::system::System;
 use nullsweep_tests::witness::PATIENCE;
@@ -76,6 +76,11 @@ fn ends(system: &mut System) -> (PlanEvent, PlanEvent) {
     (old, new)
 }
 
+/// The patches that these knots reach.
+fn visited(knots: &[PlanKnot]) -> Vec<u32> {
+    knots.iter().filter_map(|k| k.patch).collect()
+}
+
 #[test]
 fn a_sweep_goes_on_under_another_cost_without_a_stop() {
     let stage = stage();
@@ -90,8 +95,8 @@ fn a_sweep_goes_on_under_another_cost_without_a_stop() {
     let (first, second) = (Plan::read(&first).expect("read"), Plan::read(&second).expect("read"));
     let knot = second.continues.as_ref().expect("it continues the first one").knot as usize;
     assert_eq!(second.knots[0].q, first.knots[knot].q);
-    let visited = |plan: &Plan| plan.knots.iter().filter(|k| k.patch.is_some()).count();
-    assert!(visited(&second) < visited(&first), "only what is left is swept");
+    let left = visited(&second.knots).len();
+    assert!(left < visited(&first.knots).len(), "only what is left is swept");
 
     system.executor.terminate(PATIENCE).expect("it ends");
     let found = verdict(&stage, &mut system.endpoint);
@@ -110,9 +115,33 @@ fn a_plan_that_comes_too_late_goes_on_from_where_the_arm_was_stopped() {
     let (code, said) = replan(&stage, &first, &second, "0");
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("the arm holds past knot"), "{said}");
-    let (old, _) = ends(&mut system);
+    let (old, new) = ends(&mut system);
     assert_eq!((old.kind, old.reason), (EventKind::Aborted.wire(), Reason::Stopped.wire()));
-    assert!(Plan::read(&second).expect("read").continues.is_none());
+    let (first, plan) = (Plan::read(&first).expect("read"), Plan::read(&second).expect("read"));
+    assert!(plan.continues.is_none());
+
+    // Replanned again, halfway and slowly enough that it is not at its end before that is done.
+    let half = plan.knots.len() as u32 / 2;
+    let there = |t: &Telemetry| t.plan == new.plan && t.knot >= half;
+    system.witness.see("the second plan's middle", there).expect("it moves");
+    let answer = system.witness.command(CommandKind::Speed, 0.2).expect("an answer");
+    assert_eq!(answer.verdict, Verdict::Accepted.wire());
+    let third = stage.file("third.json");
+    let (code, said) = replan(&stage, &second, &third, "0");
+    assert_eq!(code, Some(0), "{said}");
+    let third = Plan::read(&third).expect("read");
+    let followed: Vec<_> = third.past.iter().map(|stretch| &stretch.knots).collect();
+    let [before, between] = followed[..] else { panic!("{} plans led to it", followed.len()) };
+    assert_eq!(before[..], first.knots[..before.len()]);
+    assert_eq!(between[..], plan.knots[..between.len()]);
+    // The last patch that was reached may be half swept.
+    let again = visited(&third.knots);
+    for knots in [before, between] {
+        let swept = visited(knots);
+        let swept = &swept[..swept.len().saturating_sub(1)];
+        assert!(swept.len() > 1, "too little was swept to tell: {swept:?}");
+        assert!(swept.iter().all(|p| !again.contains(p)), "{swept:?} and again {again:?}");
+    }
     system.executor.terminate(PATIENCE).expect("it ends");
     let found = verdict(&stage, &mut system.endpoint);
     assert_eq!(found["violations"], 0, "{found:#}");
