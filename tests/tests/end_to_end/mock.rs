@@ -7,6 +7,7 @@ use std::time::Duration;
 use nullsweep_ipc_types::ports::{Ipc, Receiver, Sender, now_ns};
 use nullsweep_ipc_types::{JointStates, Mode, Setpoint, status};
 use nullsweep_tests::stage::{Part, Process, Stage};
+use nullsweep_tests::system::VERDICT;
 use nullsweep_tests::witness::PATIENCE;
 use serde_json::Value;
 
@@ -67,7 +68,7 @@ impl Hand {
 
 fn start(stage: &Stage, more: &[&str]) -> Process {
     let mut args: Vec<OsString> = stage.place().to_vec();
-    args.extend(["--json".into(), stage.file("mock.json").into()]);
+    args.extend(["--json".into(), stage.file(VERDICT).into()]);
     args.extend(more.iter().map(OsString::from));
     stage.start(Part::Mock, "mock", args).expect("the mock starts")
 }
