@@ -76,12 +76,12 @@ impl World {
             Some(touch) if touch.depth == f64::INFINITY => {
                 let far =
                     |s: &Sphere| self.field.is_farther(&pose.apply(&s.centre), s.radius + slack);
-                return touch.tree.all(far, |_| false) || {
-                    let (low, high) = touch.bounds(pose, slack);
-                    self.field.all_in_box(&low, &high, |p| {
-                        self.point_value(shape, pose, contact, p, slack) >= slack
-                    })
-                };
+                let holds =
+                    |p: &Vector3<f64>| self.point_value(shape, pose, contact, p, slack) >= slack;
+                return touch.tree.all(far, |_| false)
+                    || touch.guards.iter().all(|(place, solid)| {
+                        self.field.all_near(solid, &pose.then(place), slack, holds)
+                    });
             }
             Some(touch) => touch.margin,
             None => self.margins.environment,
@@ -93,14 +93,8 @@ impl World {
         {
             return true;
         }
-        // All points near enough lie in the shape's bounds grown by what is needed.
-        let at = pose.then(&shape.place);
-        let (low, high) = shape.solid.bounds();
-        let centre = at.apply(&(0.5 * (low + high)));
-        let half = at.rotation.abs() * (0.5 * (high - low)) + Vector3::repeat(need);
-        self.field.all_in_box(&(centre - half), &(centre + half), |p| {
-            shape.solid.distance_bound(&at.apply_inverse(p)) >= need
-                || self.point_value(shape, pose, contact, p, slack) >= slack
+        self.field.all_near(&shape.solid, &pose.then(&shape.place), need, |p| {
+            self.point_value(shape, pose, contact, p, slack) >= slack
         })
     }
 

@@ -4,12 +4,20 @@
 //! the bound at any place is the node's less the way to the node: never more than the true
 //! distance. What the grid cannot prove is decided on the raw points, kept in cells.
 
+use super::frame::Frame;
+use super::sieve::Sieve;
+use super::solid::Solid;
 use nalgebra::{Point3, Vector3};
+use wide::f32x8;
 
 /// The points that the moving links can reach, in the root frame.
 #[derive(Debug, Default)]
 pub(crate) struct Field {
     points: Vec<Vector3<f64>>,
+    /// The same less `min`, eight at a time; beyond the last one far away. \[m\]
+    lanes: Vec<[f32x8; 3]>,
+    /// What single precision may take away from a distance. \[m\]
+    rounding: f64,
     /// Bounds of the points, for what is far outside of the grids. \[m\]
     min: Vector3<f64>,
     max: Vector3<f64>,
@@ -48,6 +56,8 @@ const COARSE_NODES: f64 = 3.0e5;
 const COARSE_BORDER: f64 = 0.3;
 /// Cells of the points are this many fine spacings wide.
 const CELL: f64 = 2.5;
+/// Where there is no point. \[m\]
+const FAR_AWAY: f32 = 1e6;
 /// Covers the rounding of stored f32 distances below 10 m. \[m\]
 const ROUNDING: f64 = 2e-6;
 
@@ -80,7 +90,18 @@ impl Field {
         let fine_cap = (BAND as f64 + 0.5) * h;
         fine.scatter(&points, fine_cap);
         let coarse = Grid::coarse(min, max, h, &points);
-        Self { points, min, max, coarse, fine, fine_cap, cells, starts }
+        let lanes = points
+            .chunks(8)
+            .map(|eight| {
+                std::array::from_fn(|i| {
+                    let lane = |k: usize| eight.get(k).map_or(FAR_AWAY, |p| (p[i] - min[i]) as f32);
+                    f32x8::from(std::array::from_fn::<f32, 8, _>(lane))
+                })
+            })
+            .collect();
+        // A hundred roundings of a coordinate.
+        let rounding = 1e-5 * (1.0 + extent.norm());
+        Self { points, lanes, rounding, min, max, coarse, fine, fine_cap, cells, starts }
     }
 
     /// The points kept.
@@ -136,6 +157,52 @@ impl Field {
                     let inside = (0..3).all(|i| p[i] >= min[i] && p[i] <= max[i]);
                     if inside && !test(p) {
                         return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// Calls `test` on every point that may be nearer than `need` to the solid standing at `at`, and
+    /// on some that are not, until it is false; whether it never was.
+    #[inline]
+    pub(crate) fn all_near(
+        &self,
+        solid: &Solid,
+        at: &Frame,
+        need: f64,
+        mut test: impl FnMut(&Vector3<f64>) -> bool,
+    ) -> bool {
+        let need = need + self.rounding;
+        let (low, high) = solid.bounds();
+        let centre = at.apply(&(0.5 * (low + high)));
+        let half = at.rotation.abs() * (0.5 * (high - low)) + Vector3::repeat(need);
+        let (min, max) = (centre - half, centre + half);
+        if self.points.is_empty() || (0..3).any(|i| min[i] > self.max[i] || max[i] < self.min[i]) {
+            return true;
+        }
+        let sieve = Sieve::new(solid, at, &self.min, need);
+        let grid = &self.cells;
+        let (low, high) = (grid.clamped_cell(&min), grid.clamped_cell(&max));
+        // Rows come in the order of their points, and the end of one may share its eight with the
+        // start of the next.
+        let mut done = 0;
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
+                let row = (z * grid.size[1] + y) * grid.size[0];
+                let from = self.starts[row + low[0]] as usize;
+                let to = self.starts[row + high[0] + 1] as usize;
+                let eights = done.max(from / 8)..to.div_ceil(8);
+                done = done.max(eights.end);
+                for eight in eights {
+                    let mut near = sieve.near(&self.lanes[eight]);
+                    while near != 0 {
+                        let point = self.points.get(8 * eight + near.trailing_zeros() as usize);
+                        if point.is_some_and(|p| !test(p)) {
+                            return false;
+                        }
+                        near &= near - 1;
                     }
                 }
             }

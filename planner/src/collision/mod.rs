@@ -44,6 +44,7 @@ mod never;
 mod pairs;
 mod parts;
 mod proof;
+mod sieve;
 mod solid;
 mod spheres;
 mod srdf;

@@ -66,6 +66,11 @@ impl Hull {
         }
         Some(Self { shape, planes, min, max })
     }
+
+    /// Outward unit normal and offset of each face.
+    pub(crate) fn planes(&self) -> &[(Vector3<f64>, f64)] {
+        &self.planes
+    }
 }
 
 impl Solid {

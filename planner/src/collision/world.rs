@@ -64,7 +64,8 @@ pub(crate) struct Touch {
     pub(crate) keep_out: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// Their corners, in the body frame. \[m\]
     corners: Vec<Vector3<f64>>,
-    /// Covers the boxes, in the body frame; only for the pad.
+    /// The boxes as solids, and spheres that cover them, in the body frame; only for the pad.
+    pub(crate) guards: Vec<(Frame, Solid)>,
     pub(crate) tree: SphereTree,
 }
 
@@ -312,17 +313,6 @@ impl Fixed {
 }
 
 impl Touch {
-    /// Bounds of the keep-out boxes grown by `more`, the body standing at `pose`, in the root
-    /// frame. \[m\]
-    pub(crate) fn bounds(&self, pose: &Frame, more: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let nowhere = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        let (low, high) = self.corners.iter().fold(nowhere, |(low, high), corner| {
-            let at = pose.apply(corner);
-            (low.inf(&at), high.sup(&at))
-        });
-        (low - Vector3::repeat(more), high + Vector3::repeat(more))
-    }
-
     fn new(
         part: &Part,
         solid: &Solid,
@@ -354,12 +344,14 @@ impl Touch {
                 keep_out.push((min, to));
             }
         }
-        let mut tree = SphereTree::default();
+        let (mut guards, mut tree) = (Vec::new(), SphereTree::default());
         if part.is_pad {
             for (low, high) in &keep_out {
                 let cover = Solid::Box { half: 0.5 * (high - low) };
                 let at = Frame { translation: 0.5 * (low + high), ..Frame::IDENTITY };
-                tree.append(&SphereTree::new(&cover, &contact.frame.then(&at)));
+                let at = contact.frame.then(&at);
+                tree.append(&SphereTree::new(&cover, &at));
+                guards.push((at, cover));
             }
         }
         let corners = keep_out
@@ -372,7 +364,7 @@ impl Touch {
             })
             .map(|corner| contact.frame.apply(&corner))
             .collect();
-        Self { margin, depth, keep_out, corners, tree }
+        Self { margin, depth, keep_out, corners, guards, tree }
     }
 }
 
