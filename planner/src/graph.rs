@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -145,7 +146,7 @@ impl Graph {
 
 /// Builds the graph over the patches that `reached` marks: each patch's nearest neighbours
 /// within the radius, in the union of both directions, joined where a surface line exists and
-/// some branch and redundancy value can be followed along it. What `before` found between the
+/// some branch can be followed along it: at one redundancy value, or else with a detour. What `before` found between the
 /// first patches, which must be the same, is taken over.
 #[must_use]
 pub fn build(
@@ -166,10 +167,12 @@ pub fn build(
             let known = before.and_then(|graph| graph.known(a, b));
             let edge = known.unwrap_or_else(|| {
                 let edge = Edge::between(surface, patches, a, b, config)?;
-                TURNS
-                    .iter()
-                    .map(|degrees| Edge { turn: f64::to_radians(*degrees), ..edge.clone() })
-                    .find(|edge| can_be_followed(cell, patches, edge, &values))
+                let mut ways: Vec<Way> =
+                    TURNS.iter().map(|turn| Way::new(cell, patches, &edge, *turn)).collect();
+                let even = ways.iter_mut().position(|way| way.is_followed(cell, &values));
+                let found =
+                    even.or_else(|| ways.iter().position(|way| way.has_detour(cell, &values)))?;
+                Some(ways.swap_remove(found).edge)
             });
             progress.tick();
             edge
@@ -221,29 +224,64 @@ fn neighbour_pairs(
     pairs
 }
 
-/// Whether one branch at one of the redundancy values can be followed along the edge, the pad
-/// turned from it as it says.
-fn can_be_followed(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, values: &[f64]) -> bool {
-    let (first, last) = (edge.heading_a + edge.turn, edge.heading_b + edge.turn);
-    let path = ToolPath::along(edge, false, first, last, cell.tool.stand_off);
-    let pose = |i: usize, heading: f64| {
-        let patch = &patches[i];
-        let travel = direction(&patch.normal, heading);
-        contact_pose(&patch.centre, &patch.normal, &travel, cell.tool.stand_off)
-    };
-    let (start, end) = (pose(edge.a, first), pose(edge.b, last));
-    let (mut from, mut to) = (Vec::new(), Vec::new());
-    values.iter().any(|&value| {
-        from.clear();
-        to.clear();
-        cell.samples(&start, first, &[value], &mut from);
-        if from.is_empty() {
+/// An edge with the pad turned from it.
+struct Way {
+    edge: Edge,
+    path: ToolPath,
+    /// Contact pose and heading at both ends.
+    ends: [(Isometry3<f64>, f64); 2],
+    /// The samples at its start, as far as they were asked for.
+    from: Vec<Sample>,
+}
+
+impl Way {
+    /// `turn` in \[°\].
+    fn new(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, turn: f64) -> Self {
+        let edge = Edge { turn: turn.to_radians(), ..edge.clone() };
+        let headings = [edge.heading_a + edge.turn, edge.heading_b + edge.turn];
+        let stand_off = cell.tool.stand_off;
+        let path = ToolPath::along(&edge, false, headings[0], headings[1], stand_off);
+        let end = |patch: usize, heading: f64| {
+            let patch = &patches[patch];
+            let travel = direction(&patch.normal, heading);
+            (contact_pose(&patch.centre, &patch.normal, &travel, stand_off), heading)
+        };
+        let ends = [end(edge.a, headings[0]), end(edge.b, headings[1])];
+        Self { edge, path, ends, from: Vec::new() }
+    }
+
+    /// Whether one branch can be followed at one of the redundancy values.
+    fn is_followed(&mut self, cell: Workcell<'_>, values: &[f64]) -> bool {
+        let [(start, first), (end, last)] = &self.ends;
+        let mut to = Vec::new();
+        values.iter().any(|value| {
+            let value = std::slice::from_ref(value);
+            let before = self.from.len();
+            cell.samples(start, *first, value, &mut self.from);
+            let from = &self.from[before..];
+            if from.is_empty() {
+                return false;
+            }
+            to.clear();
+            cell.samples(end, *last, value, &mut to);
+            from.iter().any(|f| {
+                let mut same = to.iter().filter(|t| t.branch == f.branch);
+                same.any(|t| cell.follow(&self.path, f, t).is_ok())
+            })
+        })
+    }
+
+    /// Whether one branch can be followed where none of the values by itself can, going from one
+    /// to another.
+    fn has_detour(&self, cell: Workcell<'_>, values: &[f64]) -> bool {
+        if self.from.is_empty() || values.len() < 2 {
             return false;
         }
-        cell.samples(&end, last, &[value], &mut to);
-        from.iter()
-            .any(|f| to.iter().any(|t| t.branch == f.branch && cell.follow(&path, f, t).is_ok()))
-    })
+        let (end, last) = &self.ends[1];
+        let mut to = Vec::new();
+        cell.samples(end, *last, values, &mut to);
+        cell.detour(&self.path, &self.from, &to).is_some()
+    }
 }
 
 /// Connected components of the reachable patches.

@@ -9,9 +9,9 @@
 //! An estimate is the straight cost times the mean ratio of true to straight cost seen so far
 //! between the same two layers: the detour of the surface line is much the same for all samples.
 //! The search ends when no path's estimate is lower than the best path made by more than
-//! `GAP`, and every motion of that path is proven free of collision between its joint vectors.
+//! `GAP`.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use nullsweep_robot::{JointVector, MAX_DOF};
 use rayon::prelude::*;
@@ -52,10 +52,6 @@ pub trait Moves: Sync {
 
     /// Follows the surface from a sample to another; `None` where that fails.
     fn track(&self, link: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<Self::Path>>;
-
-    /// Whether a motion that was made is free of collision all along: dearer than making it, so it
-    /// is asked only for the motions of a path that would be the result.
-    fn is_proven(&self, path: &Self::Path) -> bool;
 
     /// Jumps from a sample (`None`: from the source) to another; `None` where no motion is
     /// found.
@@ -111,7 +107,6 @@ pub fn shortest<C: Cost, M: Moves>(
     let problem = Problem { cost, continuous, source, layers, moves };
     let mut search = Search::new(problem, visited);
     let mut made: HashMap<Key, Motion<M::Path>> = HashMap::new();
-    let mut proven: HashSet<Key> = HashSet::new();
     let (mut jumps, mut failed_jumps) = (vec![0usize; layers.len()], vec![0usize; layers.len()]);
     let mut best: Option<(f64, Vec<Key>)> = None;
     let (mut rounds, mut tried, mut dirty) = (0, 0, 0);
@@ -123,25 +118,7 @@ pub fn shortest<C: Cost, M: Moves>(
         let enough = best.as_ref().is_some_and(|(cost, _)| estimate >= cost * (1.0 - GAP));
         if open.is_empty() || enough || (best.is_some() && rounds > MAX_ROUNDS) {
             let (_, keys) = best.take().filter(|_| !open.is_empty()).unwrap_or((0.0, keys));
-            let doubtful: Vec<usize> =
-                (0..keys.len()).filter(|&p| !proven.contains(&keys[p])).collect();
-            let proofs: Vec<bool> =
-                doubtful.par_iter().map(|&p| moves.is_proven(&made[&keys[p]].path)).collect();
-            dirty = usize::MAX;
-            for (&p, is_proven) in doubtful.iter().zip(&proofs) {
-                if *is_proven {
-                    proven.insert(keys[p]);
-                } else {
-                    let (a, b) = (keys[p].from.map_or(0, |(_, a)| a), keys[p].to.1);
-                    made.remove(&keys[p]);
-                    search.into[p].fall_back_to_jump(a, b);
-                    dirty = dirty.min(p);
-                }
-            }
-            if dirty == usize::MAX {
-                return search.finish(&keys, made, rounds, tried);
-            }
-            continue;
+            return search.finish(&keys, made, rounds, tried);
         }
         tried += open.len();
         let attempts: Vec<Option<Motion<M::Path>>> =
@@ -457,9 +434,6 @@ mod tests {
         fn track(&self, _: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<()>> {
             let extra = if self.straight_tracks { 0.0 } else { surcharge(from, to) };
             extra.is_finite().then(|| Motion { cost: straight(&from.q, &to.q) + extra, path: () })
-        }
-        fn is_proven(&self, (): &()) -> bool {
-            true
         }
         fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
             let start = from.map_or([0.0; MAX_DOF], |s| s.q);

@@ -13,6 +13,7 @@ pub mod collision;
 pub mod reach;
 pub mod stance;
 
+pub mod detour;
 pub mod graph;
 pub mod surface;
 pub mod track;

@@ -77,8 +77,8 @@ impl<'a, C: Cost> Mover<'a, C> {
         Self { cell, graph, stops, cost, source, lift, seed }
     }
 
-    /// The motion along an edge, or `reversed` back, its joint vectors free of collision; `None`
-    /// where the branch cannot be followed.
+    /// The motion along an edge, or `reversed` back, free of collision; `None` where the branch
+    /// cannot be followed.
     #[must_use]
     pub fn along(
         &self,
@@ -89,7 +89,8 @@ impl<'a, C: Cost> Mover<'a, C> {
     ) -> Option<Motion<Leg>> {
         let stand_off = self.cell.tool.stand_off;
         let path = ToolPath::along(edge, reversed, from.heading, to.heading, stand_off);
-        let track = self.cell.follow(&path, from, to).ok()?;
+        let around = || self.cell.detour(&path, &[*from], &[*to]);
+        let track = self.cell.follow(&path, from, to).ok().or_else(around)?;
         let cost = cost::of_path(self.cost, &track.joints);
         let line = track.line.into_iter().map(Some).collect();
         Some(Motion { cost, path: Leg { joints: track.joints, line } })
@@ -119,11 +120,6 @@ impl<C: Cost> Moves for Mover<'_, C> {
     fn track(&self, link: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<Leg>> {
         let (edge, reversed) = link;
         self.along(&self.graph.edges[edge], reversed, from, to)
-    }
-
-    fn is_proven(&self, leg: &Leg) -> bool {
-        // A jump's segments were proven when it was made.
-        leg.is_jump() || self.cell.is_proven(&leg.joints)
     }
 
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<Leg>> {

@@ -1,7 +1,7 @@
 //! Following a tool path along the surface with one branch of the inverse kinematics.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use nullsweep_robot::{JointVector, MAX_DOF};
+use nullsweep_robot::{Branch, JointVector, MAX_DOF};
 
 use crate::collision::ToolContact;
 use crate::graph::Edge;
@@ -42,7 +42,7 @@ pub enum TrackFailure {
     Fold,
     /// It leaves the margined soft limits.
     Limit,
-    /// The arm collides.
+    /// The arm collides, or no proof was found that it does not.
     Collision,
     /// The branch does not arrive at the sample asked for.
     Elsewhere,
@@ -91,33 +91,40 @@ impl ToolPath {
         Self { stations, stand_off }
     }
 
+    /// How many points the surface line has, at least two.
+    pub(crate) fn stations(&self) -> usize {
+        self.stations.len()
+    }
+
+    /// The contact pose at a station.
+    pub(crate) fn pose(&self, station: usize) -> Isometry3<f64> {
+        let Station { point, normal, travel, .. } = &self.stations[station];
+        contact_pose(point, normal, travel, self.stand_off)
+    }
+
     /// The contact pose `share` of the way from station `i` to the next.
-    fn pose(&self, i: usize, share: f64) -> Isometry3<f64> {
-        let a = &self.stations[i];
-        if share == 0.0 {
-            return contact_pose(&a.point, &a.normal, &a.travel, self.stand_off);
-        }
-        let b = &self.stations[i + 1];
+    fn between(&self, i: usize, share: f64) -> Isometry3<f64> {
+        let [a, b] = [&self.stations[i], &self.stations[i + 1]];
         let mix = |x: Vector3<f64>, y: Vector3<f64>| x * (1.0 - share) + y * share;
         let normal = UnitVector3::new_normalize(mix(a.normal.into_inner(), b.normal.into_inner()));
         let point = Point3::from(mix(a.point.coords, b.point.coords));
         contact_pose(&point, &normal, &mix(a.travel, b.travel), self.stand_off)
     }
 
-    /// Share of the whole path at `share` of the way from station `i` to the next.
-    fn share(&self, i: usize, share: f64) -> f64 {
-        let a = self.stations[i].share;
-        if share == 0.0 { a } else { a + share * (self.stations[i + 1].share - a) }
+    /// Share of the whole path up to a station.
+    pub(crate) fn share(&self, station: usize) -> f64 {
+        self.stations[station].share
     }
 }
 
 impl Workcell<'_> {
     /// Follows the path from one sample to another on one branch, the redundancy parameter
-    /// changing evenly, and checks limits and collisions at every joint vector of the result;
-    /// [`Self::is_proven`] looks between them. There the pad stays within 0.1 mm of the line.
+    /// changing evenly. All joint vectors of the result are inside the limits, the whole motion
+    /// is proven free of collision, the pad on the surface, and the pad stays within 0.1 mm of the
+    /// line.
     ///
     /// # Errors
-    /// Says what ended the branch, see [`TrackFailure`].
+    /// Says what ended the branch, see [`TrackFailure`]. [`Self::detour`] may still find a way.
     pub fn follow(
         &self,
         path: &ToolPath,
@@ -127,103 +134,120 @@ impl Workcell<'_> {
         if from.branch != to.branch {
             return Err(TrackFailure::Elsewhere);
         }
-        let mut run = Run {
-            cell: self,
-            path,
-            from,
-            to,
-            contact_in_tip: self.tool.contact_in_tip(),
-            track: Track::default(),
-        };
-        run.push(from.q, path.pose(0, 0.0));
-        for i in 0..path.stations.len() - 1 {
-            let pose = path.pose(i + 1, 0.0);
-            let near = run.last();
-            let q = run.solve(&pose, path.share(i + 1, 0.0), &near)?;
-            run.span(i, (0.0, near), (1.0, q), pose, MAX_HALVINGS)?;
+        let mut run = Run::new(*self, path, from);
+        for station in 1..path.stations() {
+            let share = path.share(station);
+            let redundancy = from.redundancy + share * (to.redundancy - from.redundancy);
+            let pose = path.pose(station);
+            let q = run.solve(&pose, redundancy, &run.last.q)?;
+            run.step(Place { share: 1.0, q, redundancy, pose })?;
         }
-        let arrived = run.last();
-        if (0..MAX_DOF).any(|j| wrap(arrived[j] - to.q[j]).abs() > 1e-6) {
+        if !arrives(&run.last.q, &to.q) {
             return Err(TrackFailure::Elsewhere);
         }
-        // All at once: much of what one joint vector proves holds for its neighbours too.
-        if !self.world.all_free(&run.track.joints, ToolContact::Allowed) {
+        if !self.world.path_free(&run.track.joints, ToolContact::Allowed) {
             return Err(TrackFailure::Collision);
         }
         Ok(run.track)
     }
-
-    /// Whether the whole motion along the track, the pad on the surface, is free of collision.
-    #[must_use]
-    pub fn is_proven(&self, track: &[JointVector]) -> bool {
-        self.world.path_free(track, ToolContact::Allowed)
-    }
 }
 
-/// One run of [`Workcell::follow`].
-struct Run<'a> {
-    cell: &'a Workcell<'a>,
+/// Whether a branch that came to `q` is where it should be, but for whole turns.
+pub(crate) fn arrives(q: &JointVector, at: &JointVector) -> bool {
+    (0..MAX_DOF).all(|j| wrap(q[j] - at[j]).abs() <= 1e-6)
+}
+
+/// Whether no joint goes so far from `a` to `b` that another branch must be there.
+pub(crate) fn is_step(a: &JointVector, b: &JointVector) -> bool {
+    (0..MAX_DOF).all(|j| (b[j] - a[j]).abs() <= MAX_STEP)
+}
+
+/// A joint vector of the branch on one step of the line.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// Share of the step.
+    pub(crate) share: f64,
+    pub(crate) q: JointVector,
+    pub(crate) redundancy: f64,
+    /// Contact pose.
+    pub(crate) pose: Isometry3<f64>,
+}
+
+/// The way along a tool path on one branch, from station to station.
+pub(crate) struct Run<'a> {
+    cell: Workcell<'a>,
     path: &'a ToolPath,
-    from: &'a Sample,
-    to: &'a Sample,
+    branch: Branch,
     contact_in_tip: Isometry3<f64>,
-    track: Track,
+    tip_in_contact: Isometry3<f64>,
+    /// The station that was reached last.
+    station: usize,
+    pub(crate) last: Place,
+    pub(crate) track: Track,
 }
 
-impl Run<'_> {
-    fn last(&self) -> JointVector {
-        self.track.joints[self.track.joints.len() - 1]
+impl<'a> Run<'a> {
+    pub(crate) fn new(cell: Workcell<'a>, path: &'a ToolPath, from: &Sample) -> Self {
+        let contact_in_tip = cell.tool.contact_in_tip();
+        let (q, redundancy, pose) = (from.q, from.redundancy, path.pose(0));
+        Self {
+            cell,
+            path,
+            branch: from.branch,
+            contact_in_tip,
+            tip_in_contact: contact_in_tip.inverse(),
+            station: 0,
+            last: Place { share: 0.0, q, redundancy, pose },
+            track: Track { joints: vec![q], line: vec![pose.translation.vector.into()] },
+        }
     }
 
-    fn push(&mut self, q: JointVector, pose: Isometry3<f64>) {
-        self.track.joints.push(q);
-        self.track.line.push(Point3::from(pose.translation.vector));
-    }
-
-    /// The branch's joint vector at a pose, inside the limits.
-    fn solve(
+    /// The branch's joint vector at a pose, inside the limits; joints unwrapped nearest to `near`.
+    pub(crate) fn solve(
         &self,
         pose: &Isometry3<f64>,
-        share: f64,
+        redundancy: f64,
         near: &JointVector,
     ) -> Result<JointVector, TrackFailure> {
-        let tip = pose * self.contact_in_tip.inverse();
-        let redundancy = self.from.redundancy + share * (self.to.redundancy - self.from.redundancy);
-        let found = self.cell.arm.ik().solve_on(self.from.branch, &tip, redundancy, near);
+        let tip = pose * self.tip_in_contact;
+        let found = self.cell.arm.ik().solve_on(self.branch, &tip, redundancy, near);
         let q = found.ok_or(TrackFailure::Fold)?.q;
-        if (0..MAX_DOF).any(|j| (q[j] - near[j]).abs() > MAX_STEP) {
-            return Err(TrackFailure::Fold);
-        }
         if !self.cell.arm.within_margins(&q) {
             return Err(TrackFailure::Limit);
         }
         Ok(q)
     }
 
-    /// Appends the joint vectors after `a` up to `b` on station `i`'s step, halving it while
-    /// the pad leaves the line between them.
-    fn span(
-        &mut self,
-        i: usize,
-        a: (f64, JointVector),
-        b: (f64, JointVector),
-        b_pose: Isometry3<f64>,
-        halvings: u32,
-    ) -> Result<(), TrackFailure> {
-        let middle: JointVector = std::array::from_fn(|j| 0.5 * (a.1[j] + b.1[j]));
-        let share = 0.5 * (a.0 + b.0);
-        let pose = self.path.pose(i, share);
+    /// Goes on to a place at the next station, the redundancy parameter changing evenly.
+    pub(crate) fn step(&mut self, to: Place) -> Result<(), TrackFailure> {
+        self.span(Place { share: 0.0, ..self.last }, to, MAX_HALVINGS)?;
+        self.station += 1;
+        self.last = to;
+        Ok(())
+    }
+
+    /// Appends the joint vectors after `a` up to `b`, halving the way while the pad leaves the line
+    /// between them.
+    fn span(&mut self, a: Place, b: Place, halvings: u32) -> Result<(), TrackFailure> {
+        if !is_step(&a.q, &b.q) {
+            return Err(TrackFailure::Fold);
+        }
+        let middle: JointVector = std::array::from_fn(|j| 0.5 * (a.q[j] + b.q[j]));
+        let share = 0.5 * (a.share + b.share);
+        let pose = self.path.between(self.station, share);
         let pad = self.cell.arm.tip_pose(&middle) * self.contact_in_tip;
-        let off = (pad.translation.vector - pose.translation.vector).norm();
-        if off > LINE_TOLERANCE {
+        if (pad.translation.vector - pose.translation.vector).norm() > LINE_TOLERANCE {
             if halvings == 0 {
                 return Err(TrackFailure::Fold);
             }
-            let q = self.solve(&pose, self.path.share(i, share), &a.1)?;
-            self.span(i, a, (share, q), pose, halvings - 1)?;
-            return self.span(i, (share, q), b, b_pose, halvings - 1);
+            let redundancy = 0.5 * (a.redundancy + b.redundancy);
+            let q = self.solve(&pose, redundancy, &a.q)?;
+            let half = Place { share, q, redundancy, pose };
+            self.span(a, half, halvings - 1)?;
+            return self.span(half, b, halvings - 1);
         }
-        self.push(b.1, b_pose);
+        self.track.joints.push(b.q);
+        self.track.line.push(b.pose.translation.vector.into());
         Ok(())
     }
 }

@@ -38,6 +38,24 @@ enum Piece {
     Line { knot: usize, from: f64, to: f64, halvings: u32 },
 }
 
+impl Piece {
+    /// From one joint vector of the path to another; a line if nothing is between them.
+    fn between(from: usize, to: usize) -> Self {
+        match to - from {
+            1 => Self::Line { knot: from, from: 0.0, to: 1.0, halvings: 0 },
+            _ => Self::Knots(from, to),
+        }
+    }
+
+    /// The joint vector in its middle, or the one before that.
+    fn middle(&self) -> usize {
+        match *self {
+            Self::Knots(from, to) => (from + to) / 2,
+            Self::Line { knot, .. } => knot,
+        }
+    }
+}
+
 /// The frames of all bodies at a joint vector, and the centres of the balls about them.
 struct Posture {
     poses: [Frame; MAX_BODIES],
@@ -52,9 +70,8 @@ struct Proof<'a> {
     postures: Vec<Posture>,
     /// Way of each joint from the path's start up to each joint vector. \[rad\] or \[m\]
     ways: Vec<JointVector>,
-    /// How far each line bends, see [`super::motion::Reach::bend`]; none: only the joint vectors
-    /// themselves are looked at. \[m\]
-    bends: Option<Vec<[f64; MAX_BODIES]>>,
+    /// How far each line bends, see [`super::motion::Reach::bend`]. \[m\]
+    bends: Vec<[f64; MAX_BODIES]>,
 }
 
 impl World {
@@ -70,78 +87,64 @@ impl World {
     /// free; see [`Self::motion_free`].
     #[must_use]
     pub fn path_free(&self, path: &[JointVector], contact: ToolContact) -> bool {
-        path.iter().all(|q| self.is_in_range(q)) && Proof::new(self, path, contact, true).holds()
+        self.unproven(path, contact).is_none()
     }
 
-    /// Whether each of the joint vectors is free, whatever is between them. Neighbours are best
-    /// near each other.
+    /// Where along the path no proof was found: at this joint vector, or between it and the next.
+    /// None: the whole path is free, see [`Self::path_free`].
     #[must_use]
-    pub fn all_free(&self, path: &[JointVector], contact: ToolContact) -> bool {
-        path.iter().all(|q| self.is_in_range(q)) && Proof::new(self, path, contact, false).holds()
+    pub fn unproven(&self, path: &[JointVector], contact: ToolContact) -> Option<usize> {
+        let outside = path.iter().position(|q| !self.is_in_range(q));
+        outside.or_else(|| Proof::new(self, path, contact).gap())
     }
 }
 
 impl<'a> Proof<'a> {
-    fn new(world: &'a World, path: &'a [JointVector], contact: ToolContact, between: bool) -> Self {
+    fn new(world: &'a World, path: &'a [JointVector], contact: ToolContact) -> Self {
         let mut ways = vec![[0.0; MAX_DOF]];
-        let mut bends = between.then(Vec::new);
+        let mut bends = Vec::with_capacity(path.len());
         for pair in path.windows(2) {
             let way = std::array::from_fn(|j| (pair[1][j] - pair[0][j]).abs());
             let before = ways[ways.len() - 1];
             ways.push(std::array::from_fn(|j| before[j] + way[j]));
-            if let Some(bends) = &mut bends {
-                let mut bend = [0.0; MAX_BODIES];
-                for (body, bend) in bend.iter_mut().enumerate().take(world.bodies.bodies.len()) {
-                    *bend = world.reach.bend(body, &way);
-                }
-                bends.push(bend);
+            let mut bend = [0.0; MAX_BODIES];
+            for (body, bend) in bend.iter_mut().enumerate().take(world.bodies.bodies.len()) {
+                *bend = world.reach.bend(body, &way);
             }
+            bends.push(bend);
         }
         let postures = path.iter().map(|q| Posture::of(world, q)).collect();
         Self { world, path, contact, postures, ways, bends }
     }
 
-    fn holds(&self) -> bool {
-        if self.path.is_empty() {
-            return true;
-        }
+    /// Where the path collides, or is not proven.
+    fn gap(&self) -> Option<usize> {
+        let last = self.path.len().checked_sub(1)?;
         // Coarse pieces first: they find a collision soonest.
-        let mut open = VecDeque::from([(Piece::Knots(0, self.path.len() - 1), self.all_checks())]);
+        let mut open = VecDeque::from([(Piece::between(0, last), self.all_checks())]);
         while let Some((piece, checks)) = open.pop_front() {
-            let Some(left) = self.left_open(piece, checks) else { return false };
-            if left.is_empty() {
+            let Some(left) = self.left_open(piece, checks) else { return Some(piece.middle()) };
+            // A path of one joint vector has no halves.
+            if left.is_empty() || last == 0 {
                 continue;
             }
-            match piece {
-                Piece::Knots(from, to) if from == to => {}
-                Piece::Knots(from, to) if self.bends.is_none() => {
-                    let middle = (from + to) / 2;
-                    if middle > from {
-                        open.push_back((Piece::Knots(from, middle - 1), left.clone()));
-                    }
-                    open.push_back((Piece::Knots(middle + 1, to), left));
-                }
-                Piece::Knots(from, to) if to - from == 1 => {
-                    open.push_back((
-                        Piece::Line { knot: from, from: 0.0, to: 1.0, halvings: 0 },
-                        left,
-                    ));
-                }
-                Piece::Knots(from, to) => {
-                    let middle = (from + to) / 2;
-                    open.push_back((Piece::Knots(from, middle), left.clone()));
-                    open.push_back((Piece::Knots(middle, to), left));
-                }
-                Piece::Line { halvings: HALVINGS, .. } => return false,
+            let halves = match piece {
+                Piece::Line { knot, halvings: HALVINGS, .. } => return Some(knot),
                 Piece::Line { knot, from, to, halvings } => {
                     let (middle, halvings) = (0.5 * (from + to), halvings + 1);
                     let half = |from, to| Piece::Line { knot, from, to, halvings };
-                    open.push_back((half(from, middle), left.clone()));
-                    open.push_back((half(middle, to), left));
+                    [half(from, middle), half(middle, to)]
                 }
-            }
+                Piece::Knots(from, to) => {
+                    let middle = piece.middle();
+                    [Piece::between(from, middle), Piece::between(middle, to)]
+                }
+            };
+            let [first, second] = halves;
+            open.push_back((first, left.clone()));
+            open.push_back((second, left));
         }
-        true
+        None
     }
 
     /// From the tip to the base, as collisions are likelier there.
@@ -168,8 +171,23 @@ impl<'a> Proof<'a> {
                     std::array::from_fn(|j| a[j] + t * (b[j] - a[j]))
                 };
                 middle = Posture::of(self.world, &at(0.5 * (from + to)));
-                let ends = [from, to].map(|t| Posture::of(self.world, &at(t)));
-                (&middle.poses, self.line_slack(moves, knot, to - from, &middle, &ends))
+                let halfway = |t: f64| Posture::of(self.world, &at(t));
+                let (start, end);
+                let ends = [
+                    if from == 0.0 {
+                        &self.postures[knot]
+                    } else {
+                        start = halfway(from);
+                        &start
+                    },
+                    if to == 1.0 {
+                        &self.postures[knot + 1]
+                    } else {
+                        end = halfway(to);
+                        &end
+                    },
+                ];
+                (&middle.poses, self.line_slack(moves, knot, to - from, &middle, ends))
             }
         };
         let clear =
@@ -193,9 +211,7 @@ impl<'a> Proof<'a> {
                 (&posture.poses[body], &posture.centres[body])
             };
             let chord = (from..=to).map(|k| reach.chord(body, of(at), of(k))).fold(0.0, f64::max);
-            let bend = self.bends.as_ref().map_or(0.0, |bends| {
-                bends[from..to].iter().map(|bend| bend[body]).fold(0.0, f64::max)
-            });
+            let bend = self.bends[from..to].iter().map(|bend| bend[body]).fold(0.0, f64::max);
             slack.body[body] = (chord + bend).min(reach.way(body, &way));
         }
         slack
@@ -208,7 +224,7 @@ impl<'a> Proof<'a> {
         knot: usize,
         share: f64,
         middle: &Posture,
-        ends: &[Posture; 2],
+        ends: [&Posture; 2],
     ) -> Slack<'a> {
         let reach = &self.world.reach;
         let half = 0.5 * share;
@@ -222,7 +238,7 @@ impl<'a> Proof<'a> {
                 let (end, end_centre) = of(end);
                 reach.chord(body, (&frame, &centre), (&end, &end_centre))
             });
-            let bend = self.bends.as_ref().map_or(0.0, |bends| bends[knot][body]) * half * half;
+            let bend = self.bends[knot][body] * half * half;
             slack.body[body] = (chord.fold(0.0, f64::max) + bend).min(reach.way(body, &way));
         }
         slack

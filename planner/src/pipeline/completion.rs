@@ -179,7 +179,7 @@ impl<C: Cost> Trip<'_, C> {
 
     /// A way along the surface from one stop, the pad turned from the line as it is there.
     fn reach_from(&self, stop: usize) -> Option<(Sample, Motion<Leg>)> {
-        let Shop { cell, job, surface, .. } = self.shop;
+        let Shop { job, surface, .. } = self.shop;
         let Visit { patch, sample: from, .. } = &self.visits[stop];
         let edge = Edge::between(surface, self.patches, *patch, self.patch, &job.graph)?;
         let heading = edge.heading_b + from.heading - edge.heading_a;
@@ -187,10 +187,10 @@ impl<C: Cost> Trip<'_, C> {
         targets.retain(|to| to.branch == from.branch);
         let apart = |to: &Sample| (to.redundancy - from.redundancy).abs();
         targets.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
-        targets.iter().take(TARGETS).find_map(|to| {
-            let motion = self.mover.along(&edge, false, from, to)?;
-            cell.is_proven(&motion.path.joints).then_some((*to, motion))
-        })
+        targets
+            .iter()
+            .take(TARGETS)
+            .find_map(|to| self.mover.along(&edge, false, from, to).map(|motion| (*to, motion)))
     }
 
     /// A jump to the patch and one from there on, in place of a jump or at the end.
