@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, SMatrix};
 
 use crate::chain::Chain;
 use crate::fingerprint::fingerprint;
-use crate::ik::{InverseKinematics, Numeric, RedundantJoint, Solvers};
+use crate::ik::{InverseKinematics, Numeric, RedundantJoint, Solvers, spread_over};
 use crate::limits::{JointLimits, LimitsError, apply_toml};
 use crate::urdf::{Joint, JointKind, Model, Robot};
 use crate::{JointVector, MAX_DOF, pr2};
@@ -118,6 +118,12 @@ impl Arm {
     #[must_use]
     pub fn limits(&self) -> &[JointLimits] {
         &self.limits
+    }
+
+    /// Whether a joint of the chain turns; else it slides.
+    #[must_use]
+    pub fn is_revolute(&self, joint: usize) -> bool {
+        !self.chain.steps[joint].prismatic
     }
 
     /// Every other movable joint of the robot that follows no other, in the order of the URDF.
@@ -248,6 +254,13 @@ impl Arm {
             home[i] = pr2::ready(name).filter(|_| self.is_pr2()).unwrap_or(middle);
         }
         home
+    }
+
+    /// The k-th joint vector of a fixed sequence that fills the margined ranges evenly; continuous
+    /// joints take −π … π.
+    #[must_use]
+    pub fn spread(&self, k: usize) -> JointVector {
+        spread_over(&self.margined, k)
     }
 
     /// Inverse kinematics. In closed form for an arm of the PR2's shape (the upper-arm roll is the

@@ -11,13 +11,14 @@ mod shape;
 mod six;
 mod subproblem;
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
-use crate::JointVector;
 use crate::chain::Chain;
 use crate::limits::JointLimits;
+use crate::{JointVector, MAX_DOF};
 use analytic::Analytic;
 use closed::ClosedForm;
 pub(crate) use numeric::Numeric;
@@ -127,4 +128,15 @@ impl Solvers {
     pub(crate) fn is_pr2_shaped(&self) -> bool {
         matches!(self, Self::Pr2 { .. })
     }
+}
+
+/// The k-th joint vector of a sequence that fills the ranges evenly; joints without an end take
+/// −π … π.
+pub(crate) fn spread_over(ranges: &[(f64, f64)], k: usize) -> JointVector {
+    let mut q = [0.0; MAX_DOF];
+    for (i, &(lower, upper)) in ranges.iter().enumerate() {
+        let (lower, upper) = if lower.is_finite() { (lower, upper) } else { (-PI, PI) };
+        q[i] = lower + (upper - lower) * folds::spread(k, i);
+    }
+    q
 }

@@ -11,7 +11,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
-use super::folds::{Folds, MOST_FOLDS, same, self_motion, spread};
+use super::folds::{Folds, MOST_FOLDS, same, self_motion};
+use super::spread_over;
 use super::{Branch, InverseKinematics, Solution, Solutions};
 use crate::chain::Chain;
 use crate::limits::{JointLimits, unwrap_near, wrap};
@@ -65,16 +66,8 @@ const SIGNS: u8 = 0b1_1111;
 impl Numeric {
     pub(crate) fn new(chain: &Chain, limits: &[JointLimits], margined: &[(f64, f64)]) -> Self {
         let redundant = redundant_joint(chain);
-        let seed = |k| {
-            let mut q = [0.0; MAX_DOF];
-            for (i, &(lower, upper)) in margined.iter().enumerate() {
-                let (lower, upper) = if lower.is_finite() { (lower, upper) } else { (-PI, PI) };
-                q[i] = lower + (upper - lower) * spread(k, i);
-            }
-            q
-        };
         Self {
-            seeds: (0..SEEDS).map(seed).collect(),
+            seeds: (0..SEEDS).map(|k| spread_over(margined, k)).collect(),
             folds: Folds::of(chain, redundant),
             chain: chain.clone(),
             limits: limits.to_vec(),
