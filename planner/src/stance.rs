@@ -1,7 +1,7 @@
 //! Where the robot stands before the object, and how its held joints are set.
 
-use nalgebra::{Isometry3, Point3, Vector3};
-use nullsweep_robot::{Arm, ArmError, CollisionShape, Geometry, Robot, Solutions};
+use nalgebra::{Isometry3, Point3, Rotation2, Vector2, Vector3};
+use nullsweep_robot::{Arm, ArmError, CollisionShape, Geometry, MAX_DOF, Robot, Solutions};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +40,10 @@ impl Stance {
 /// What the search for a stance tries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StanceSearch {
-    /// Distances of the root frame from the object's centre on the floor. \[m\]
+    /// The place of the robot, in its root frame, whose distance is meant: 0, 0 or where the arm's
+    /// first axis is. \[m\]
+    pub pivot: [f64; 2],
+    /// Its distances from the object's centre on the floor. \[m\]
     pub distances: Vec<f64>,
     /// Directions around the object, evenly over a full turn.
     pub bearings: usize,
@@ -60,6 +63,7 @@ impl Default for StanceSearch {
     /// For the PR2: 0.4–1.2 m away, three heights of its torso.
     fn default() -> Self {
         Self {
+            pivot: [0.0; 2],
             distances: (0..11).map(|i| 0.35 + 0.08 * f64::from(i)).collect(),
             bearings: 32,
             yaws: [-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0].map(f64::to_radians).to_vec(),
@@ -67,6 +71,46 @@ impl Default for StanceSearch {
             held: Vec::new(),
             patches: 60,
             finalists: 24,
+        }
+    }
+}
+
+/// Configurations by which an arm's reach is measured.
+const REACH_SAMPLES: usize = 2000;
+/// Distances from the object's centre that are tried, as shares of the reach.
+const NEAREST: f64 = 0.3;
+const FARTHEST: f64 = 1.1;
+const DISTANCES: u32 = 11;
+/// A first joint about the vertical with such a range makes up for any yaw. \[rad\]
+const ALL_ROUND: f64 = 5.0;
+
+impl StanceSearch {
+    /// For an arm: as far from the object as it reaches, about its first axis. The PR2's where
+    /// there is its torso.
+    #[must_use]
+    pub fn of(robot: &Robot, arm: &Arm, tool: &Tool) -> Self {
+        let search = Self::default();
+        let lifts = |(name, _): &(String, _)| arm.held_joints().iter().any(|h| h.name == *name);
+        if search.lift.as_ref().is_some_and(lifts) {
+            return search;
+        }
+        let mut poses = vec![Isometry3::identity(); robot.links().len()];
+        arm.link_poses(&[0.0; MAX_DOF], &mut poses);
+        let pivot = poses[arm.moving_links()[0]].translation.vector;
+        let contact = tool.contact_in_tip();
+        let reach = (0..REACH_SAMPLES)
+            .map(|k| ((arm.tip_pose(&arm.spread(k)) * contact).translation.vector - pivot).norm())
+            .fold(0.0, f64::max);
+        let share =
+            |i: u32| NEAREST + (FARTHEST - NEAREST) * f64::from(i) / f64::from(DISTANCES - 1);
+        let turns_all_round = arm.jacobian(&[0.0; MAX_DOF])[(5, 0)].abs() > 0.99
+            && arm.limits()[0].upper - arm.limits()[0].lower > ALL_ROUND;
+        Self {
+            pivot: [pivot.x, pivot.y],
+            distances: (0..DISTANCES).map(|i| reach * share(i)).collect(),
+            yaws: if turns_all_round { vec![0.0] } else { search.yaws },
+            lift: None,
+            ..search
         }
     }
 }
@@ -88,6 +132,8 @@ const REDUNDANCIES: usize = 12;
 const ROBUST: usize = 3;
 /// Space that the standing body keeps from the scan. \[m\]
 const BODY_SPACE: f64 = 0.03;
+/// Half of the width of a body that is only known by its meshes. \[m\]
+const BODY_WIDTH: f64 = 0.08;
 
 /// Stances on a ring of candidates around the object, best first, at most
 /// `search.finalists`; empty where none reaches anything. Scan and patches in the floor frame.
@@ -120,10 +166,12 @@ pub fn candidates(
             for b in 0..search.bearings {
                 let bearing = std::f64::consts::TAU * b as f64 / search.bearings as f64;
                 for &yaw in &search.yaws {
+                    let turn = bearing + std::f64::consts::PI + yaw;
+                    let pivot = Rotation2::new(turn) * Vector2::from(search.pivot);
                     let base = [
-                        centre.x + distance * bearing.cos(),
-                        centre.y + distance * bearing.sin(),
-                        bearing + std::f64::consts::PI + yaw,
+                        centre.x + distance * bearing.cos() - pivot.x,
+                        centre.y + distance * bearing.sin() - pivot.y,
+                        turn,
                     ];
                     stances.push((
                         Stance { base, held: held.clone() },
@@ -207,6 +255,13 @@ fn body_boxes(robot: &Robot, arm: &Arm) -> Vec<(Point3<f64>, Point3<f64>)> {
             continue;
         }
         boxes.extend(link.collisions.iter().filter_map(|shape| extent(&poses[i], shape)));
+    }
+    if boxes.is_empty() {
+        // Meshes alone: something stands from the root to the first joint.
+        let joint = poses[arm.moving_links()[0]].translation.vector;
+        let around = Vector3::new(BODY_WIDTH, BODY_WIDTH, 0.0);
+        let (low, high) = (Vector3::zeros().inf(&joint), Vector3::zeros().sup(&joint));
+        boxes.push((Point3::from(low - around), Point3::from(high + around)));
     }
     boxes
 }

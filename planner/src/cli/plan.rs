@@ -6,7 +6,7 @@ use std::str::FromStr;
 use anyhow::{Context, ensure};
 use clap::Args;
 use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
-use nullsweep_robot::{JointVector, MAX_DOF};
+use nullsweep_robot::{JointVector, MAX_DOF, Robot};
 
 use super::bars::Bars;
 use super::picture::picture;
@@ -51,7 +51,8 @@ pub(super) struct PlanArgs {
     /// Position of another held joint: NAME=VALUE.
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     held: Vec<HeldArg>,
-    /// Where the arm starts: its joints, comma-separated; without it its home posture.
+    /// Where the arm starts: its joints, comma-separated; without it the SRDF's home, or the middle of
+    /// its ranges or the nearest posture that is free of collision.
     #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true, value_delimiter = ',')]
     start: Vec<f64>,
 
@@ -170,7 +171,7 @@ pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8,
     let robot = args.robot.robot()?;
     bars.stage("scan", None);
     let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
-    let job = job(args, &scene, after)?;
+    let job = job(args, &robot, &scene, after)?;
     let outcome = pipeline::run(&robot, &scene.surface, &job, &bars);
     bars.clear();
     let outcome = outcome?;
@@ -264,7 +265,7 @@ fn figures_table(figures: &Figures) -> report::Table {
     }
 }
 
-fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<Job> {
+fn job(args: &PlanArgs, robot: &Robot, scene: &Scene, after: Option<After>) -> anyhow::Result<Job> {
     let tool = match &args.tool {
         None => Tool::default(),
         Some(path) => {
@@ -280,7 +281,9 @@ fn job(args: &PlanArgs, scene: &Scene, after: Option<After>) -> anyhow::Result<J
         }),
         (None, Base::At(base)) => StanceChoice::Given(Stance { base, held: held(args) }),
         (None, Base::Auto) => {
-            let mut search = StanceSearch { held: held(args), ..StanceSearch::default() };
+            let arm = robot.arm(&args.robot.spec()?)?;
+            let mut search =
+                StanceSearch { held: held(args), ..StanceSearch::of(robot, &arm, &tool) };
             if args.torso.is_some() {
                 search.lift = None;
             }

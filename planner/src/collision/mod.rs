@@ -55,7 +55,7 @@ mod world;
 pub use exact::Exact;
 pub use mesh::{MeshError, MeshPaths};
 pub use pairs::{Excluded, Reason};
-pub use srdf::SrdfError;
+pub use srdf::{GroupState, SrdfError, group_states};
 pub use world::World;
 
 use nalgebra::{Isometry3, Point3, Vector3};

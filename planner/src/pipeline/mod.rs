@@ -4,6 +4,7 @@ mod attempt;
 mod completion;
 mod joint;
 mod setting;
+mod start;
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -28,7 +29,8 @@ use crate::timing::{Limits, Profile, Rest, accelerate};
 use crate::tool::Tool;
 use crate::verify::{self, Verification};
 use attempt::{Attempt, Shop};
-use setting::{Setting, settle, start};
+use setting::{Setting, settle};
+use start::{Start, start};
 
 /// What is to be planned.
 #[derive(Clone, Debug)]
@@ -43,7 +45,8 @@ pub struct Job {
     pub surroundings: Vec<Point3<f64>>,
     /// Solid things besides the scan, posed in the floor frame.
     pub obstacles: Vec<Obstacle>,
-    /// Where the arm is; `None`: its home posture. \[rad\] or \[m\]
+    /// Where the arm is; `None`: the SRDF's home, the middle of its ranges or, where it collides
+    /// there, the nearest free posture that is found. \[rad\] or \[m\]
     pub start: Option<JointVector>,
     /// A plan that this one goes on from.
     pub after: Option<After>,
@@ -273,7 +276,10 @@ pub fn run(
     for note in world.notes() {
         progress.note(note);
     }
-    let mut start = start(job, &arm, &world)?;
+    let Start { q: mut start, note } = start(job, &arm, &world)?;
+    if let Some(note) = note {
+        progress.note(&note);
+    }
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
 
     // A plan that joins another one in motion first comes to rest on the other one's path.

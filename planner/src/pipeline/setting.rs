@@ -1,15 +1,16 @@
 //! The robot in its place.
 
 use nalgebra::Point3;
-use nullsweep_robot::{Arm, JointVector, Robot};
+use nullsweep_robot::{Arm, Robot};
 use rayon::prelude::*;
 
+use super::start::start;
 use super::{Job, PipelineError, StanceChoice};
-use crate::collision::{Obstacle, ToolContact, World};
+use crate::collision::{Obstacle, World};
 use crate::graph::{self, GraphConfig};
 use crate::patches::Patch;
 use crate::progress::Silent;
-use crate::reach::{Workcell, reach};
+use crate::reach::{Sample, Workcell, reach};
 use crate::scan::Scan;
 use crate::stance::{self, Stance};
 use crate::surface::Surface;
@@ -42,27 +43,45 @@ pub(super) fn settle(
         StanceChoice::Search(search) => {
             let candidates = stance::candidates(robot, arm, &job.tool, scan, patches, search)?;
             let tried = candidates.len();
-            // Candidates are looked at side by side, each by itself; the best share of points
-            // whose patch is reached without a collision wins, ties go to the earlier one.
-            let judged: Vec<Result<Option<(usize, Setting)>, PipelineError>> = candidates
+            // Candidates are looked at side by side, each by itself.
+            let open: Vec<Result<Option<Open>, PipelineError>> = candidates
                 .into_par_iter()
                 .map(|c| {
                     let setting = Setting::new(robot, arm, scan, patches, job, c.stance)?;
-                    Ok(setting.score(job).map(|score| (score, setting)))
+                    Ok(setting.open(job))
                 })
                 .collect();
-            let mut best: Option<(usize, Setting)> = None;
-            for entry in judged {
-                if let Some((score, setting)) = entry?
-                    && best.as_ref().is_none_or(|(s, _)| score > *s)
-                {
-                    best = Some((score, setting));
-                }
-            }
-            best.map(|(_, setting)| setting)
-                .ok_or(PipelineError::NoStance { tried, patches: patches.len() })
+            let open: Result<Vec<_>, _> = open.into_iter().filter_map(Result::transpose).collect();
+            best_of(open?, job).ok_or(PipelineError::NoStance { tried, patches: patches.len() })
         }
     }
+}
+
+/// A stance that reaches something, not yet looked at as a whole.
+struct Open {
+    setting: Setting,
+    reached: Vec<Option<Sample>>,
+    /// What [`Setting::score`] is at most.
+    most: usize,
+}
+
+/// The setting with the best score, the earlier one of two that are alike. Those that promise most
+/// are scored first, some side by side, until none that is left could be better.
+fn best_of(mut open: Vec<Open>, job: &Job) -> Option<Setting> {
+    open.sort_by_key(|entry| std::cmp::Reverse(entry.most));
+    let mut open = open.into_iter().peekable();
+    let mut best: Option<(usize, Setting)> = None;
+    while open.peek().is_some_and(|next| best.as_ref().is_none_or(|(s, _)| next.most > *s)) {
+        let batch: Vec<Open> = open.by_ref().take(SIDE_BY_SIDE).collect();
+        let scores: Vec<usize> =
+            batch.par_iter().map(|entry| entry.setting.score(job, &entry.reached)).collect();
+        for (score, entry) in scores.into_iter().zip(batch) {
+            if best.as_ref().is_none_or(|(s, _)| score > *s) {
+                best = Some((score, entry.setting));
+            }
+        }
+    }
+    best.map(|(_, setting)| setting)
 }
 
 impl Setting {
@@ -89,52 +108,37 @@ impl Setting {
         Ok(Self { stance, arm, scan, patches, world })
     }
 
-    /// Points of reached patches, each weighed by the edges that lead on from its patch, up to
-    /// `WELL_JOINED`; `None` where body or start posture collide, or nothing is reached.
-    fn score(&self, job: &Job) -> Option<usize> {
+    fn cell<'a>(&'a self, job: &'a Job) -> Workcell<'a> {
+        Workcell { arm: &self.arm, tool: &job.tool, world: &self.world }
+    }
+
+    /// What the stance reaches; `None` where body or start posture collide, or it is nothing.
+    fn open(self, job: &Job) -> Option<Open> {
         start(job, &self.arm, &self.world).ok()?;
         if self.world.stance_hit().is_some() {
             return None;
         }
-        let cell = Workcell { arm: &self.arm, tool: &job.tool, world: &self.world };
-        let reached = reach(cell, &self.patches, job.ik_samples, &|| ());
+        let reached = reach(self.cell(job), &self.patches, job.ik_samples, &|| ());
+        let points = self.patches.iter().zip(&reached).filter(|(_, r)| r.is_some());
+        let points: usize = points.map(|(patch, _)| patch.points.len()).sum();
+        (points > 0).then_some(Open { setting: self, reached, most: points * (1 + WELL_JOINED) })
+    }
+
+    /// Points of reached patches, each weighed by the edges that lead on from its patch, up to
+    /// `WELL_JOINED`.
+    fn score(&self, job: &Job, reached: &[Option<Sample>]) -> usize {
         let surface = Surface::new(&self.scan);
         let config = GraphConfig { edge_samples: 24, ..job.graph };
-        let graph = graph::build(cell, &surface, &self.patches, &reached, &config, None, &Silent);
-        let score = (0..self.patches.len())
+        let graph =
+            graph::build(self.cell(job), &surface, &self.patches, reached, &config, None, &Silent);
+        (0..self.patches.len())
             .filter(|&i| reached[i].is_some())
             .map(|i| self.patches[i].points.len() * (1 + graph.incident[i].len().min(WELL_JOINED)))
-            .sum();
-        (score > 0).then_some(score)
+            .sum()
     }
 }
 
 /// Edges from a patch from which on a stance gains nothing by more of them.
 const WELL_JOINED: usize = 4;
-
-/// The joint vector that the plan starts from.
-pub(super) fn start(job: &Job, arm: &Arm, world: &World) -> Result<JointVector, PipelineError> {
-    if let Some(after) = &job.after
-        && after.held.is_none()
-    {
-        let knots = after.plan.knots.len();
-        return after
-            .plan
-            .knots
-            .get(after.knot)
-            .map(|k| k.q)
-            .ok_or(PipelineError::NoSuchKnot { knots, knot: after.knot });
-    }
-    let held = job.after.as_ref().and_then(|after| after.held);
-    let start = held.or(job.start).unwrap_or_else(|| arm.home());
-    for (j, &(low, high)) in arm.margined_limits().iter().enumerate() {
-        if !(low..=high).contains(&start[j]) {
-            let joint = arm.joint_names()[j].clone();
-            return Err(PipelineError::StartLimit { joint, value: start[j], low, high });
-        }
-    }
-    match world.why_not(&start, ToolContact::Allowed) {
-        Some(hit) => Err(PipelineError::StartHit { hit: hit.to_string() }),
-        None => Ok(start),
-    }
-}
+/// Stances that are scored side by side.
+const SIDE_BY_SIDE: usize = 4;

@@ -1,0 +1,87 @@
+//! The posture that a plan starts from.
+
+use nullsweep_robot::{Arm, JointVector, MAX_DOF};
+
+use super::{Job, PipelineError};
+use crate::collision::{self, CollisionError, ToolContact, World};
+
+/// Where the arm is before the first motion.
+pub(super) struct Start {
+    pub(super) q: JointVector,
+    /// What a user should know who did not say where the arm is.
+    pub(super) note: Option<String>,
+}
+
+/// Postures that are tried where the arm collides at home.
+const TRIED: usize = 1000;
+
+/// The joint vector that the plan starts from: that of the plan it goes on from, the one asked for,
+/// or a posture inside the limits and free of collision, the nearest to home that is found.
+pub(super) fn start(job: &Job, arm: &Arm, world: &World) -> Result<Start, PipelineError> {
+    if let Some(after) = &job.after
+        && after.held.is_none()
+    {
+        let knots = after.plan.knots.len();
+        let knot = after.plan.knots.get(after.knot);
+        let q = knot.ok_or(PipelineError::NoSuchKnot { knots, knot: after.knot })?.q;
+        return Ok(Start { q, note: None });
+    }
+    if let Some(q) = job.after.as_ref().and_then(|after| after.held).or(job.start) {
+        check(arm, world, &q)?;
+        return Ok(Start { q, note: None });
+    }
+    let states = match &job.collision.srdf {
+        Some(path) => collision::group_states(path).map_err(CollisionError::from)?,
+        None => Vec::new(),
+    };
+    let named = states.iter().find_map(|state| Some((state.name.as_str(), posture(arm, state)?)));
+    let (name, home) = named.unwrap_or(("home", arm.home()));
+    let Err(error) = check(arm, world, &home) else {
+        let note = named.map(|(name, _)| format!("the arm starts in the SRDF's posture {name}"));
+        return Ok(Start { q: home, note });
+    };
+    let Some(q) = nearest_free(arm, world, &home) else { return Err(error) };
+    let joints: Vec<String> = q[..arm.dof()].iter().map(|v| format!("{v:.2}")).collect();
+    let joints = joints.join(",");
+    let note =
+        format!("the arm cannot start at {name} ({error}): planned from --start={joints} instead");
+    Ok(Start { q, note: Some(note) })
+}
+
+/// Inside the margined limits and free of collision.
+fn check(arm: &Arm, world: &World, q: &JointVector) -> Result<(), PipelineError> {
+    for (j, &(low, high)) in arm.margined_limits().iter().enumerate() {
+        if !(low..=high).contains(&q[j]) {
+            let joint = arm.joint_names()[j].clone();
+            return Err(PipelineError::StartLimit { joint, value: q[j], low, high });
+        }
+    }
+    match world.why_not(q, ToolContact::Allowed) {
+        Some(hit) => Err(PipelineError::StartHit { hit: hit.to_string() }),
+        None => Ok(()),
+    }
+}
+
+/// A state's joint vector, if it says where every joint of the arm is.
+fn posture(arm: &Arm, state: &collision::GroupState) -> Option<JointVector> {
+    let mut q = [0.0; MAX_DOF];
+    for (value, name) in q.iter_mut().zip(arm.joint_names()) {
+        *value = state.joints.iter().find(|(joint, _)| joint == name)?.1;
+    }
+    Some(q)
+}
+
+/// The posture nearest to `home`, as shares of the joints' ranges, of many that are spread over
+/// them, the tool clear of everything.
+fn nearest_free(arm: &Arm, world: &World, home: &JointVector) -> Option<JointVector> {
+    let apart = |q: &JointVector| -> f64 {
+        let share = |(j, &(low, high)): (usize, &(f64, f64))| {
+            let width = if low.is_finite() { high - low } else { std::f64::consts::TAU };
+            ((q[j] - home[j]) / width.max(f64::MIN_POSITIVE)).powi(2)
+        };
+        arm.margined_limits().iter().enumerate().map(share).sum()
+    };
+    let mut tried: Vec<JointVector> = (0..TRIED).map(|k| arm.spread(k)).collect();
+    tried.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
+    tried.into_iter().find(|q| world.is_free(q, ToolContact::Forbidden))
+}
