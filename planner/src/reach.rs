@@ -1,5 +1,7 @@
 //! Which patches the arm reaches, and with which joint vectors.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
 use nullsweep_robot::{Arm, Branch, JointVector, Solutions};
 use rayon::prelude::*;
@@ -117,6 +119,21 @@ impl Workcell<'_> {
         first
     }
 
+    /// The joint vector with the last joint, which turns the pad, where it is and, if its limits are
+    /// more than a turn apart, a turn on: an edge may lead past half a turn.
+    fn turns(&self, q: &JointVector) -> impl Iterator<Item = JointVector> + use<'_> {
+        let last = self.arm.dof() - 1;
+        let (low, high) = self.arm.margined_limits()[last];
+        let bounded = low.is_finite() && self.arm.is_revolute(last);
+        let q = *q;
+        [0.0, -TAU, TAU].into_iter().filter_map(move |turn| {
+            let mut turned = q;
+            turned[last] += turn;
+            let inside = (low..=high).contains(&turned[last]);
+            (turn == 0.0 || bounded && inside).then_some(turned)
+        })
+    }
+
     /// Calls `visit` on each valid sample until it returns true.
     fn visit_samples(
         &self,
@@ -131,11 +148,14 @@ impl Workcell<'_> {
             solutions.clear();
             self.arm.ik().solve(&tip, redundancy, &mut solutions);
             for s in &solutions {
-                if self.arm.within_margins(&s.q)
-                    && self.world.is_free(&s.q, ToolContact::Allowed)
-                    && visit(Sample { q: s.q, branch: s.branch, redundancy, heading })
+                if !self.arm.within_margins(&s.q) || !self.world.is_free(&s.q, ToolContact::Allowed)
                 {
-                    return;
+                    continue;
+                }
+                for q in self.turns(&s.q) {
+                    if visit(Sample { q, branch: s.branch, redundancy, heading }) {
+                        return;
+                    }
                 }
             }
         }
@@ -159,7 +179,7 @@ pub fn reach(
     patches
         .par_iter()
         .map(|patch| {
-            let turn = if cell.tool.symmetric { 0.5 } else { 1.0 } * std::f64::consts::TAU;
+            let turn = if cell.tool.symmetric { 0.5 } else { 1.0 } * TAU;
             let found = (0..HEADINGS).find_map(|h| {
                 let heading = turn * h as f64 / HEADINGS as f64;
                 let travel = direction(&patch.normal, heading);

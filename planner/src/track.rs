@@ -1,7 +1,7 @@
 //! Following a tool path along the surface with one branch of the inverse kinematics.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use nullsweep_robot::{Branch, JointVector, MAX_DOF};
+use nullsweep_robot::{Branch, JointLimits, JointVector, MAX_DOF};
 
 use crate::collision::ToolContact;
 use crate::graph::Edge;
@@ -142,7 +142,7 @@ impl Workcell<'_> {
             let q = run.solve(&pose, redundancy, &run.last.q)?;
             run.step(Place { share: 1.0, q, redundancy, pose })?;
         }
-        if !arrives(&run.last.q, &to.q) {
+        if !arrives(self.arm.limits(), &run.last.q, &to.q) {
             return Err(TrackFailure::Elsewhere);
         }
         if !self.world.path_free(&run.track.joints, ToolContact::Allowed) {
@@ -152,9 +152,13 @@ impl Workcell<'_> {
     }
 }
 
-/// Whether a branch that came to `q` is where it should be, but for whole turns.
-pub(crate) fn arrives(q: &JointVector, at: &JointVector) -> bool {
-    (0..MAX_DOF).all(|j| wrap(q[j] - at[j]).abs() <= 1e-6)
+/// Whether a branch that came to `q` is where it should be. Only a joint without limits may be whole
+/// turns from there.
+pub(crate) fn arrives(limits: &[JointLimits], q: &JointVector, at: &JointVector) -> bool {
+    limits.iter().enumerate().all(|(j, limits)| {
+        let off = q[j] - at[j];
+        (if limits.continuous { wrap(off) } else { off }).abs() <= 1e-6
+    })
 }
 
 /// Whether no joint goes so far from `a` to `b` that another branch must be there.
