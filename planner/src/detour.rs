@@ -197,7 +197,9 @@ impl<'a> Search<'a> {
                     node.state = match found {
                         Some(q) if !is_last => State::Solved(q),
                         // The ends are samples, which are free.
-                        Some(q) if arrives(self.cell.arm.limits(), &q, &self.to[index].q) => State::Free(q),
+                        Some(q) if arrives(self.cell.arm.limits(), &q, &self.to[index].q) => {
+                            State::Free(q)
+                        }
                         _ => State::Out,
                     };
                 }
