@@ -51,8 +51,8 @@ pub(super) struct PlanArgs {
     /// Position of another held joint: NAME=VALUE.
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     held: Vec<HeldArg>,
-    /// Where the arm starts: its joints, comma-separated; without it the SRDF's home, or the middle of
-    /// its ranges or the nearest posture that is free of collision.
+    /// Where the arm starts: its joints, comma-separated; without it a posture that the SRDF names
+    /// (home before others), or the middle of its ranges, or the nearest free of collision.
     #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true, value_delimiter = ',')]
     start: Vec<f64>,
 

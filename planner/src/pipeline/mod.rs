@@ -45,8 +45,8 @@ pub struct Job {
     pub surroundings: Vec<Point3<f64>>,
     /// Solid things besides the scan, posed in the floor frame.
     pub obstacles: Vec<Obstacle>,
-    /// Where the arm is; `None`: the SRDF's home, the middle of its ranges or, where it collides
-    /// there, the nearest free posture that is found. \[rad\] or \[m\]
+    /// Where the arm is; `None`: a posture that the SRDF names (home before others), else the middle
+    /// of its ranges, or where it collides there the nearest free posture found. \[rad\] or \[m\]
     pub start: Option<JointVector>,
     /// A plan that this one goes on from.
     pub after: Option<After>,
