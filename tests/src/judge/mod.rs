@@ -193,7 +193,9 @@ impl Judge {
     fn continued(&self, s: &Setpoint) -> Option<Last> {
         let last = self.last.clone()?;
         let silent = s.stamp_ns > last.deadline_ns.saturating_add(self.rules.session_timeout_ns);
-        if s.sequence <= last.seen && silent { None } else { Some(last) }
+        // The first setpoint of all: an executor may be back sooner than a silence is noticed.
+        let first = s.sequence == 1 && s.stamp_ns > last.stamp_ns;
+        if s.sequence <= last.seen && (silent || first) { None } else { Some(last) }
     }
 
     fn check_start(&mut self, s: &Setpoint, positions: &JointVector, measured: &JointVector) {

@@ -155,20 +155,22 @@ fn a_session_starts_where_the_arm_is() {
     }
     only(&judged(&s, 1), Kind::Jump, 1);
 
-    // A restarted executor counts from one again after a silence: another session.
-    let mut s = stream(&arm(), 10, 0.0);
-    let again: Vec<_> = s
-        .iter()
-        .map(|s| Setpoint {
-            stamp_ns: s.stamp_ns + 500_000_000,
-            deadline_ns: s.deadline_ns + 500_000_000,
-            ..*s
-        })
-        .collect();
-    s.extend(again);
-    let verdict = judged(&s, 1);
-    assert!(verdict.is_clean(), "{:?}", verdict.first);
-    assert_eq!(verdict.sessions, 2);
+    // A restarted executor counts from one again, after a silence or at once: another session.
+    for pause_ns in [500_000_000, 12_000_000] {
+        let mut s = stream(&arm(), 10, 0.0);
+        let again: Vec<_> = s
+            .iter()
+            .map(|s| Setpoint {
+                stamp_ns: s.stamp_ns + pause_ns,
+                deadline_ns: s.deadline_ns + pause_ns,
+                ..*s
+            })
+            .collect();
+        s.extend(again);
+        let verdict = judged(&s, 1);
+        assert!(verdict.is_clean(), "{:?}", verdict.first);
+        assert_eq!(verdict.sessions, 2);
+    }
 }
 
 #[test]
