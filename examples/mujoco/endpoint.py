@@ -229,21 +229,22 @@ def main():
                 if s.joint_count != dof or not all(map(math.isfinite, values)):
                     refused += 1
                     continue
-                last_deadline, timed_out = s.deadline_ns, False
-                state.setpoint_sequence, state.setpoint_received_ns = s.sequence, clock
+                last_deadline = s.deadline_ns
                 disabled, running = s.disable != 0, s.plan.epoch != 0
-                simulation.enabled = not disabled
                 wanted = np.array(s.positions[:dof])
-                if disabled:
-                    following = False
+                far = np.abs(wanted - simulation.data.qpos).max() > START_TOLERANCE
+                if not disabled and not following and far:
+                    # It begins to follow only what is where the arm is, and says that it waits.
+                    refused += 1
+                    timed_out = True
                     continue
-                if not following:
-                    # It begins to follow only what is where the arm is.
-                    if np.abs(wanted - simulation.data.qpos).max() > START_TOLERANCE:
-                        refused += 1
-                        continue
-                    following = True
-                simulation.wanted, simulation.speed = wanted, np.array(s.velocities[:dof])
+                simulation.enabled = following = not disabled
+                timed_out = False
+                state.setpoint_sequence, state.setpoint_received_ns = s.sequence, clock
+                if following:
+                    simulation.wanted, simulation.speed = wanted, np.array(s.velocities[:dof])
+                else:
+                    simulation.hold()
             if following and clock > last_deadline + args.timeout * 1e6:
                 simulation.hold()
                 following, timed_out = False, True

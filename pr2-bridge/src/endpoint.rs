@@ -108,8 +108,8 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
         let before = std::mem::replace(&mut stopped, stream.has_stopped(now));
         if stopped && !before {
             tracing::warn!(
-                "setpoints have ceased, or a message would come too late (is --delay too short?): \
-                 the arm comes to rest"
+                "no setpoint is followed: they have ceased, begin elsewhere than the arm is, or a \
+                 message would come too late (is --delay too short?); the arm comes to rest"
             );
         }
         if now >= due_ns {

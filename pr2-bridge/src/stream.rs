@@ -94,13 +94,14 @@ pub struct Stream {
     rules: Rules,
     following: Option<Following>,
     waiting: VecDeque<Due>,
-    /// Sequence and deadline of those that were received, and when they are followed.
+    /// Sequence and deadline of the last that are followed, and when.
     known: VecDeque<(u64, u64, u64)>,
     /// Where and when the last message comes to rest.
     rest: Option<(Joints, u64)>,
     /// Whether the last message stands still where it ends.
     stands: bool,
-    /// Whether following ended because setpoints ceased or came too late.
+    /// Whether following ended because setpoints ceased or came too late, or does not begin as they
+    /// are too far from the arm.
     stopped: bool,
     last_deadline_ns: Option<u64>,
     last_sequence: u64,
@@ -156,12 +157,12 @@ impl Stream {
         } else {
             self.begin(setpoint, &q, measured);
         }
-        let at_ns = self.following.as_ref().map(|f| f.playout.at_ns());
-        if self.known.len() == REMEMBERED {
-            self.known.pop_front();
+        if let Some(following) = &self.following {
+            if self.known.len() == REMEMBERED {
+                self.known.pop_front();
+            }
+            self.known.push_back((sequence, deadline_ns, following.playout.at_ns()));
         }
-        let at_ns = at_ns.unwrap_or(deadline_ns + self.rules.delay_ns);
-        self.known.push_back((sequence, deadline_ns, at_ns));
     }
 
     /// Begins to follow with this setpoint, if it is where the arm is, which has come to rest.
@@ -169,6 +170,7 @@ impl Stream {
     fn begin(&mut self, setpoint: &Setpoint, q: &Joints, measured: &Joints) {
         let far = (0..DOF).any(|j| (q[j] - measured[j]).abs() > self.rules.start_tolerance);
         self.refused += u64::from(far);
+        self.stopped |= far;
         let playout = Playout::begin(self.rules.delay_ns, setpoint.sequence, setpoint.deadline_ns);
         let moves = self.rest.is_some_and(|(_, at_ns)| at_ns > playout.at_ns());
         let mode = setpoint.mode;
@@ -225,8 +227,8 @@ impl Stream {
         self.following.is_some()
     }
 
-    /// Whether setpoints have ceased or came too late; then the arm is on its way to rest on the
-    /// last message, or rests there, until it follows again.
+    /// Whether setpoints have ceased, came too late, or are too far from the arm to begin with. The
+    /// arm is then on its way to rest on the last message, or rests there, until it follows again.
     pub fn has_stopped(&mut self, now_ns: u64) -> bool {
         let ceased = self
             .last_deadline_ns
@@ -341,8 +343,11 @@ mod tests {
         let mut stream = Stream::new(RULES);
         stream.take(&setpoint(1, 0.1, 0.0), &[0.0; DOF]);
         assert!(!stream.follows() && stream.refused == 1);
+        // It says that it waits, so that the executor's setpoints come to the arm.
+        assert!(stream.has_stopped(1001 * MS) && stream.in_force(2000 * MS).is_none());
         stream.take(&setpoint(2, 0.01, 0.0), &[0.0; DOF]);
-        assert!(stream.follows());
+        assert!(stream.follows() && !stream.has_stopped(1002 * MS));
+        assert_eq!(stream.in_force(2000 * MS), Some((2, 1002 * MS)));
         // The process stalled: its stamp would lie in the past.
         assert_eq!(stream.message(1063 * MS), None);
         assert!(!stream.follows() && stream.late == 1);
