@@ -222,7 +222,7 @@ impl Endpoint {
 
     fn is_active(&self, kind: FaultKind, now_ns: u64) -> bool {
         let since = Duration::from_nanos(now_ns.saturating_sub(self.started_ns));
-        self.behaviour.faults.iter().any(|f| f.kind == kind && f.is_active(since))
+        self.behaviour.faults.iter().any(|f| f.shows(kind, since))
     }
 
     /// Stops by itself when the last setpoint's deadline and the grace have passed.
@@ -387,6 +387,7 @@ mod tests {
         assert_eq!(state_with("delay@5ms").0.expect("sent").stamp_ns, 10 * MS);
         let (state, rig) = state_with("freeze@5ms");
         assert!(state.expect("sent").positions[0] > rig.endpoint.positions()[0] + 5e-3);
+        assert_eq!(status_of("link@5ms"), status::CALIBRATED);
         let (_, rig) = state_with("deaf@5ms");
         assert!(rig.endpoint.positions()[0] > rig.home[0] - 7e-3);
         assert_eq!(state_with("drop@0s").1.endpoint.deeds().states, 11);

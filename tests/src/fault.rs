@@ -28,14 +28,19 @@ pub enum FaultKind {
     Count,
     /// Setpoints are read and judged, but the arm does not follow them.
     Deaf,
+    /// The link to the motors is cut: nothing reaches them, their encoders stand, and after
+    /// [`FaultKind::LINK_TIMEOUT`] they halt by themselves until it is back.
+    Link,
 }
 
 impl FaultKind {
     /// How far the encoder jumps: well beyond any following error. \[rad\]
     pub const JUMP: f64 = 0.3;
+    /// How long the PR2's motors stay on without communication.
+    pub const LINK_TIMEOUT: Duration = Duration::from_millis(100);
 
     /// Every kind with its name on the command line.
-    pub const NAMES: [(Self, &'static str); 11] = [
+    pub const NAMES: [(Self, &'static str); 12] = [
         (Self::Halt, "halt"),
         (Self::Error, "error"),
         (Self::Uncalibrated, "uncalibrated"),
@@ -47,6 +52,7 @@ impl FaultKind {
         (Self::Jump, "jump"),
         (Self::Count, "count"),
         (Self::Deaf, "deaf"),
+        (Self::Link, "link"),
     ];
 
     /// Its name on the command line.
@@ -68,11 +74,16 @@ pub struct FaultAt {
 }
 
 impl FaultAt {
-    /// Whether it is there at a time since the mock's start.
+    /// Whether it makes a kind of fault show at a time since the mock's start.
     #[must_use]
-    pub fn is_active(&self, since_start: Duration) -> bool {
-        since_start >= self.start
-            && self.length.is_none_or(|length| since_start < self.start + length)
+    pub fn shows(&self, kind: FaultKind, since_start: Duration) -> bool {
+        let Some(age) = since_start.checked_sub(self.start) else { return false };
+        let caused = match (self.kind, kind) {
+            (FaultKind::Link, FaultKind::Deaf | FaultKind::Freeze) => true,
+            (FaultKind::Link, FaultKind::Halt) => age >= FaultKind::LINK_TIMEOUT,
+            (own, kind) => own == kind,
+        };
+        caused && self.length.is_none_or(|length| age < length)
     }
 }
 
@@ -128,11 +139,25 @@ mod tests {
         for (kind, name) in FaultKind::NAMES {
             let fault: FaultAt = format!("{name}@1.5s").parse().expect("valid");
             assert_eq!((fault.kind, fault.start, fault.length), (kind, ms(1500), None));
-            assert!(fault.is_active(ms(9000)) && !fault.is_active(ms(1499)));
+            assert!(fault.shows(kind, ms(9000)) && !fault.shows(kind, ms(1499)));
         }
         let fault: FaultAt = "stale@2s+300ms".parse().expect("valid");
-        assert!(!fault.is_active(ms(1999)) && fault.is_active(ms(2299)));
-        assert!(!fault.is_active(ms(2300)));
+        let shows = |at| fault.shows(FaultKind::Stale, ms(at));
+        assert_eq!([1999, 2000, 2299, 2300].map(shows), [false, true, true, false]);
+        assert!(!fault.shows(FaultKind::Halt, ms(2100)));
+    }
+
+    #[test]
+    fn motors_without_a_link_halt_after_a_while() {
+        let fault: FaultAt = "link@2s+300ms".parse().expect("valid");
+        for kind in [FaultKind::Freeze, FaultKind::Deaf] {
+            assert_eq!(
+                [1999, 2000, 2300].map(|at| fault.shows(kind, ms(at))),
+                [false, true, false]
+            );
+        }
+        let halts = |at| fault.shows(FaultKind::Halt, ms(at));
+        assert_eq!([2099, 2100, 2299, 2300].map(halts), [false, true, true, false]);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use nullsweep_tests::sketch::{Sketch, swung};
 fn expected(kind: FaultKind) -> (Option<Fault>, Option<Fault>) {
     let both = |fault| (Some(fault), Some(fault));
     match kind {
-        FaultKind::Halt => both(Fault::Halted),
+        FaultKind::Halt | FaultKind::Link => both(Fault::Halted),
         FaultKind::Error => both(Fault::Endpoint),
         FaultKind::Uncalibrated => both(Fault::NotCalibrated),
         FaultKind::Stale => both(Fault::CommunicationLost),
@@ -88,8 +88,11 @@ fn matrix(fidelity: Fidelity) {
             let moves = mode == Mode::Executing;
             let (at_rest, moving) = expected(kind);
             match if moves { moving } else { at_rest } {
-                // While it waits, it does not start; while it is latched, it stays so.
-                Some(_) if mode == Mode::Init && kind != FaultKind::Jump => {
+                // While it waits, it does not start; while it is latched, it stays so. A cut link
+                // shows only after it has started.
+                Some(_)
+                    if mode == Mode::Init && !matches!(kind, FaultKind::Jump | FaultKind::Link) =>
+                {
                     assert_eq!(after.mode, Mode::Init, "{name}");
                 }
                 _ if mode == Mode::Fault => assert_eq!(after.mode, Mode::Fault, "{name}"),
