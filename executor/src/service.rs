@@ -22,6 +22,8 @@ const ANSWER_WITHIN: Duration = Duration::from_millis(50);
 /// How long the last events stay readable after the end: a publisher that exits takes what was
 /// not yet read with it.
 const LINGER: Duration = Duration::from_millis(200);
+/// Least time between two warnings of missed deadlines.
+const WARN_EVERY: Duration = Duration::from_secs(10);
 
 /// The ports and what was last told. Make it on the thread that runs it.
 #[derive(Debug)]
@@ -35,6 +37,8 @@ pub(crate) struct Service {
     snapshots: u64,
     tickets: u64,
     newest: Option<Snapshot>,
+    /// Missed deadlines that were warned of, and when.
+    warned: (u64, Option<Instant>),
 }
 
 impl Service {
@@ -49,6 +53,7 @@ impl Service {
             snapshots: 0,
             tickets: 0,
             newest: None,
+            warned: (0, None),
         })
     }
 
@@ -78,6 +83,7 @@ impl Service {
         if let Some(report) = self.slots.reports.pop() {
             self.snapshots += 1;
             self.newest = Some(report.snapshot);
+            self.warn_of_missed(report.snapshot.missed);
             let telemetry = self.telemetry_of(&report);
             if let Err(e) = self.telemetry.send(&telemetry) {
                 tracing::warn!("telemetry lost: {e}");
@@ -87,6 +93,15 @@ impl Service {
         let answered = server.answer(|command| respond(command, slots, tickets, *newest));
         if let Err(e) = answered {
             tracing::warn!("a command was not answered: {e}");
+        }
+    }
+
+    /// Plans run later by each missed deadline: whoever watches shall know.
+    fn warn_of_missed(&mut self, missed: u64) {
+        let (told, at) = self.warned;
+        if missed > told && at.is_none_or(|at| at.elapsed() >= WARN_EVERY) {
+            tracing::warn!("{} deadlines missed, {missed} since the start", missed - told);
+            self.warned = (missed, Some(Instant::now()));
         }
     }
 

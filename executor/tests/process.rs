@@ -440,7 +440,12 @@ fn a_million_armed_cycles_with_swaps() {
             PlanHeader { join_rule: rule.wire(), join_plan: running, join_knot: 60, ..header };
         let id = publisher.publish(&header, &knots).unwrap();
         if next(&events, id).0 == EventKind::Accepted {
-            assert_eq!(next(&events, id).0, EventKind::Started);
+            let then = next(&events, id);
+            if then.0 != EventKind::Started {
+                let newest = telemetry.newest().unwrap().map(|t| t.value);
+                let (_, log) = system.end();
+                panic!("{then:?} after cycle {cycle}, swap {swaps}, {newest:?}\n{log:#?}");
+            }
             swaps += 1;
             (running, last) = (id, knots);
         } else {
