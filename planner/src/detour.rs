@@ -248,18 +248,15 @@ impl<'a> Search<'a> {
     fn track(&self, way: &[usize]) -> Result<Track, usize> {
         let node = |station: usize| &self.layers[station][way[station]];
         let mut run = Run::new(self.cell, self.path, &self.from[way[0]]);
-        // The joint vectors of the track up to each station.
-        let mut knots = vec![1];
         for station in 1..way.len() {
             let redundancy = node(station).redundancy;
             let q = *node(station).q().ok_or(station - 1)?;
             let place = Place { share: 1.0, q, redundancy, pose: self.poses[station] };
             run.step(place).map_err(|_| station - 1)?;
-            knots.push(run.track.joints.len());
         }
         match self.cell.world.unproven(&run.track.joints, ToolContact::Allowed) {
             None => Ok(run.track),
-            Some(knot) => Err(knots.partition_point(|&k| k <= knot).clamp(1, way.len() - 1) - 1),
+            Some(knot) => Err(run.station_at(knot).min(way.len() - 2)),
         }
     }
 }

@@ -7,7 +7,10 @@
 //! never above it. So the search is lazy: the path that is shortest under estimates is found, the
 //! motions on it are made, their true costs (or their failure) replace the estimates, and so on.
 //! An estimate is the straight cost times the mean ratio of true to straight cost seen so far
-//! between the same two layers: the detour of the surface line is much the same for all samples.
+//! between the same two layers: the way round by the surface line is much the same for all samples.
+//! Where a tracked motion is blocked, others of the same branch that pass there with nearly the same
+//! redundancy parameter are doubted: they are taken to be longer, and once one of them is on the
+//! shortest path all the same, it may go whatever way round the obstacle is found.
 //! The search ends when no path's estimate is lower than the best path made by more than
 //! `GAP`.
 
@@ -18,6 +21,7 @@ use rayon::prelude::*;
 
 use crate::cost::{Cost, displacement};
 use crate::reach::Sample;
+use crate::track::Blocked;
 
 /// How two consecutive layers can be joined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,8 +54,19 @@ pub trait Moves: Sync {
     /// How a layer can be joined to a later one.
     fn link(&self, from: usize, to: usize) -> Link;
 
-    /// Follows the surface from a sample to another; `None` where that fails.
-    fn track(&self, link: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<Self::Path>>;
+    /// Follows the surface from a sample to another, the redundancy parameter changing evenly, or
+    /// tells where that is blocked.
+    fn track(
+        &self,
+        link: (usize, bool),
+        from: &Sample,
+        to: &Sample,
+    ) -> Result<Motion<Self::Path>, Blocked>;
+
+    /// Follows the surface from a sample to another, the redundancy parameter changing however it
+    /// must; `None` where that fails.
+    fn around(&self, link: (usize, bool), from: &Sample, to: &Sample)
+    -> Option<Motion<Self::Path>>;
 
     /// Jumps from a sample (`None`: from the source) to another; `None` where no motion is
     /// found.
@@ -90,6 +105,14 @@ const MAX_ROUNDS: usize = 100;
 const MAX_JUMPS: usize = 3;
 /// Failed jumps into one layer after which it is left out.
 const MAX_FAILED_JUMPS: usize = 12;
+/// A motion is doubtful where its redundancy parameter passes so near one that was blocked there.
+/// \[rad\]
+const NEAR: f64 = 0.02;
+/// How much longer a doubtful motion is taken to be, before one was made.
+const DOUBT: f32 = 1.2;
+/// So many doubtful motions between two layers may fail, and as many again for each that was made,
+/// until the others are given up.
+const MAX_FAILED_DOUBTFUL: usize = 8;
 
 /// The cheapest path from `source` through one sample of each layer. A layer without samples, or
 /// into which no motion is found, is left out; `left_out` is called with it.
@@ -121,7 +144,7 @@ pub fn shortest<C: Cost, M: Moves>(
             return search.finish(&keys, made, rounds, tried);
         }
         tried += open.len();
-        let attempts: Vec<Option<Motion<M::Path>>> =
+        let attempts: Vec<Result<Motion<M::Path>, Option<Blocked>>> =
             open.par_iter().map(|&p| search.attempt(p, &keys[p])).collect();
         dirty = usize::MAX;
         let mut hopeless = Vec::new();
@@ -130,17 +153,18 @@ pub fn shortest<C: Cost, M: Moves>(
             let edges = &mut search.into[p];
             dirty = dirty.min(p);
             match attempt {
-                Some(motion) => {
+                Ok(motion) => {
                     let jumps = &mut jumps[keys[p].to.0];
-                    *jumps += usize::from(!edges.is_tracked(a, b));
+                    *jumps += usize::from(edges.kind(a, b) == Kind::Jump);
                     edges.learn(a, b, motion.cost);
                     if *jumps >= MAX_JUMPS {
                         edges.close_jumps(|_, _| true);
                     }
                     made.insert(keys[p], motion);
                 }
-                None if edges.is_tracked(a, b) => edges.fall_back_to_jump(a, b),
-                None => {
+                Err(Some(blocked)) => search.doubt(p, &keys[p], &blocked),
+                Err(None) if edges.kind(a, b) == Kind::Doubtful => edges.fall_back_to_jump(a, b),
+                Err(None) => {
                     edges.close(a, b);
                     let lifts = |(l, s): (usize, usize)| moves.lifts(&layers[l][s]);
                     let (from, to) = (keys[p].from.is_none_or(lifts), lifts(keys[p].to));
@@ -270,17 +294,37 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
         }
     }
 
-    /// Makes the motion into place `p`.
-    fn attempt(&self, p: usize, key: &Key) -> Option<Motion<M::Path>> {
+    /// Makes the motion into place `p`, or says where a track is blocked.
+    fn attempt(&self, p: usize, key: &Key) -> Result<Motion<M::Path>, Option<Blocked>> {
         let Problem { layers, moves, .. } = &self.problem;
         let to = &layers[key.to.0][key.to.1];
-        let Some((layer, a)) = key.from else { return moves.jump(None, to) };
+        let Some((layer, a)) = key.from else { return moves.jump(None, to).ok_or(None) };
         let from = &layers[layer][a];
-        match moves.link(layer, key.to.0) {
-            Link::Surface { edge, reversed } if self.into[p].is_tracked(a, key.to.1) => {
-                moves.track((edge, reversed), from, to)
+        match (moves.link(layer, key.to.0), self.into[p].kind(a, key.to.1)) {
+            (Link::Surface { edge, reversed }, Kind::Track) => {
+                moves.track((edge, reversed), from, to).map_err(Some)
             }
-            _ => moves.jump(Some(from), to),
+            (Link::Surface { edge, reversed }, Kind::Doubtful) => {
+                moves.around((edge, reversed), from, to).ok_or(None)
+            }
+            _ => moves.jump(Some(from), to).ok_or(None),
+        }
+    }
+
+    /// Whatever passes near where a track into place `p` was blocked will hardly do better: the
+    /// pose there, the branch and the redundancy parameter are all that a posture depends on.
+    fn doubt(&mut self, p: usize, key: &Key, blocked: &Blocked) {
+        let Some((layer, a)) = key.from else { return };
+        let (from, to) = (&self.problem.layers[layer], &self.problem.layers[key.to.0]);
+        let (first, last) = (&from[a], &to[key.to.1]);
+        let alike = |x: &Sample, y: &Sample| x.branch == y.branch && x.heading == y.heading;
+        for (row, x) in from.iter().enumerate().filter(|(_, x)| alike(x, first)) {
+            for (column, y) in to.iter().enumerate().filter(|(_, y)| alike(y, last)) {
+                let passes = x.redundancy + blocked.share * (y.redundancy - x.redundancy);
+                if (passes - blocked.redundancy).abs() <= NEAR {
+                    self.into[p].doubt(row, column);
+                }
+            }
         }
     }
 }
@@ -301,7 +345,8 @@ impl<C: Cost, M: Moves> Problem<'_, C, M> {
             straight: Vec::with_capacity(size),
             kind: Vec::with_capacity(size),
             lift: self.moves.jump_estimate(0.0) as f32,
-            ratios: [(0.0, 0.0); 2],
+            ratios: [(0.0, 0.0); 3],
+            doubtful: [0; 2],
         };
         for (q, from) in rows {
             for to in &self.layers[to] {
@@ -322,6 +367,8 @@ impl<C: Cost, M: Moves> Problem<'_, C, M> {
 enum Kind {
     /// To be tracked along the surface; an estimate.
     Track,
+    /// To be tracked in whatever way goes, as the even change is likely to be blocked; an estimate.
+    Doubtful,
     /// To be jumped; an estimate.
     Jump,
     /// The motion was made, or cannot be made: the cost is true.
@@ -338,36 +385,41 @@ struct Edges {
     kind: Vec<Kind>,
     /// What a jump costs besides its way.
     lift: f32,
-    /// Ratios of true to straight cost seen here, of tracks and of jumps: their sum and number.
-    ratios: [(f32, f32); 2],
+    /// Ratios of true to straight cost seen here, of tracks, of doubtful ones and of jumps: their
+    /// sum and number.
+    ratios: [(f32, f32); 3],
+    /// Doubtful motions that were made, and that failed.
+    doubtful: [usize; 2],
 }
 
 impl Edges {
-    fn is_tracked(&self, a: usize, b: usize) -> bool {
-        self.kind[a * self.width + b] == Kind::Track
+    fn kind(&self, a: usize, b: usize) -> Kind {
+        self.kind[a * self.width + b]
     }
 
     fn guess(&self, kind: Kind, straight: f32) -> f32 {
-        let ratio = |of: usize| match self.ratios[of] {
-            (_, 0.0) => 1.0,
+        let ratio = |kind: Kind, unseen: f32| match self.ratios[kind as usize] {
+            (_, 0.0) => unseen,
             (sum, seen) => sum / seen,
         };
         match kind {
-            Kind::Track => straight * ratio(0),
-            _ => self.lift + straight * ratio(1),
+            Kind::Track => straight * ratio(kind, 1.0),
+            Kind::Doubtful => straight * ratio(kind, DOUBT * ratio(Kind::Track, 1.0)),
+            Kind::Jump | Kind::Known => self.lift + straight * ratio(Kind::Jump, 1.0),
         }
     }
 
     /// Puts a true cost in place and re-estimates the others of its kind.
     fn learn(&mut self, a: usize, b: usize, cost: f64) {
         let at = a * self.width + b;
-        let of = usize::from(self.kind[at] == Kind::Jump);
-        let way = cost as f32 - if of == 1 { self.lift } else { 0.0 };
-        let ratio = way / self.straight[at].max(1e-6);
+        let kind = self.kind[at];
+        let way = cost as f32 - if kind == Kind::Jump { self.lift } else { 0.0 };
+        let (sum, seen) = &mut self.ratios[kind as usize];
+        *sum += way / self.straight[at].max(1e-6);
+        *seen += 1.0;
+        self.doubtful[0] += usize::from(kind == Kind::Doubtful);
         self.kind[at] = Kind::Known;
         self.estimate[at] = cost as f32;
-        self.ratios[of].0 += ratio;
-        self.ratios[of].1 += 1.0;
         for i in 0..self.kind.len() {
             if self.kind[i] != Kind::Known {
                 self.estimate[i] = self.guess(self.kind[i], self.straight[i]);
@@ -375,10 +427,30 @@ impl Edges {
         }
     }
 
-    fn fall_back_to_jump(&mut self, a: usize, b: usize) {
+    fn set(&mut self, at: usize, kind: Kind) {
+        self.kind[at] = kind;
+        self.estimate[at] = self.guess(kind, self.straight[at]);
+    }
+
+    fn doubt(&mut self, a: usize, b: usize) {
         let at = a * self.width + b;
-        self.kind[at] = Kind::Jump;
-        self.estimate[at] = self.guess(Kind::Jump, self.straight[at]);
+        if self.kind[at] == Kind::Track {
+            self.set(at, Kind::Doubtful);
+        }
+    }
+
+    /// After a doubtful motion that failed; after too many, all of them.
+    fn fall_back_to_jump(&mut self, a: usize, b: usize) {
+        self.set(a * self.width + b, Kind::Jump);
+        let [made, failed] = &mut self.doubtful;
+        *failed += 1;
+        if *failed >= MAX_FAILED_DOUBTFUL * (*made + 1) {
+            for at in 0..self.kind.len() {
+                if self.kind[at] == Kind::Doubtful {
+                    self.set(at, Kind::Jump);
+                }
+            }
+        }
     }
 
     fn close(&mut self, a: usize, b: usize) {
@@ -407,6 +479,7 @@ impl Edges {
 mod tests {
     use super::*;
     use crate::cost::Effort;
+    use crate::track::TrackFailure;
     use nullsweep_robot::Branch;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -431,7 +504,17 @@ mod tests {
         fn link(&self, from: usize, to: usize) -> Link {
             if to == from + 1 { self.links[from] } else { Link::Jump }
         }
-        fn track(&self, _: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<()>> {
+        fn track(
+            &self,
+            link: (usize, bool),
+            from: &Sample,
+            to: &Sample,
+        ) -> Result<Motion<()>, Blocked> {
+            let redundancy = 0.5 * (from.redundancy + to.redundancy);
+            let blocked = Blocked { why: TrackFailure::Collision, share: 0.5, redundancy };
+            self.around(link, from, to).ok_or(blocked)
+        }
+        fn around(&self, _: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<()>> {
             let extra = if self.straight_tracks { 0.0 } else { surcharge(from, to) };
             extra.is_finite().then(|| Motion { cost: straight(&from.q, &to.q) + extra, path: () })
         }
@@ -455,7 +538,7 @@ mod tests {
                         let mut q = [0.0; MAX_DOF];
                         q[..3].fill_with(|| rng.random_range(-2.0..2.0));
                         let branch = Branch(rng.random_range(0..2));
-                        Sample { q, branch, redundancy: 0.0, heading: 0.0 }
+                        Sample { q, branch, redundancy: q[0], heading: 0.0 }
                     })
                     .collect()
             })
@@ -488,7 +571,7 @@ mod tests {
                         .map(|(from, label)| {
                             let tracked = (matches!(moves.links[l - 1], Link::Surface { .. })
                                 && from.branch == to.branch)
-                                .then(|| moves.track((0, false), from, to))
+                                .then(|| moves.around((0, false), from, to))
                                 .flatten();
                             let motion = tracked.or_else(|| moves.jump(Some(from), to));
                             label + motion.map_or(f64::INFINITY, |m| m.cost)

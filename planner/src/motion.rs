@@ -8,7 +8,7 @@ use crate::cost::{self, Cost};
 use crate::graph::{Edge, Graph};
 use crate::layered::{Link, Motion, Moves};
 use crate::reach::{Sample, Workcell};
-use crate::track::ToolPath;
+use crate::track::{Blocked, ToolPath, Track};
 use crate::transfer;
 
 /// A joint path into a stop.
@@ -78,7 +78,7 @@ impl<'a, C: Cost> Mover<'a, C> {
     }
 
     /// The motion along an edge, or `reversed` back, free of collision; `None` where the branch
-    /// cannot be followed.
+    /// cannot be followed, whatever the redundancy parameter does on the way.
     #[must_use]
     pub fn along(
         &self,
@@ -87,13 +87,19 @@ impl<'a, C: Cost> Mover<'a, C> {
         from: &Sample,
         to: &Sample,
     ) -> Option<Motion<Leg>> {
-        let stand_off = self.cell.tool.stand_off;
-        let path = ToolPath::along(edge, reversed, from.heading, to.heading, stand_off);
+        let path = self.path(edge, reversed, from, to);
         let around = || self.cell.detour(&path, &[*from], &[*to]);
-        let track = self.cell.follow(&path, from, to).ok().or_else(around)?;
+        self.cell.follow(&path, from, to).ok().or_else(around).map(|track| self.leg(track))
+    }
+
+    fn path(&self, edge: &Edge, reversed: bool, from: &Sample, to: &Sample) -> ToolPath {
+        ToolPath::along(edge, reversed, from.heading, to.heading, self.cell.tool.stand_off)
+    }
+
+    fn leg(&self, track: Track) -> Motion<Leg> {
         let cost = cost::of_path(self.cost, &track.joints);
         let line = track.line.into_iter().map(Some).collect();
-        Some(Motion { cost, path: Leg { joints: track.joints, line } })
+        Motion { cost, path: Leg { joints: track.joints, line } }
     }
 
     /// A seed that depends on the two ends alone, not on when or on which thread it is asked for.
@@ -117,8 +123,22 @@ impl<C: Cost> Moves for Mover<'_, C> {
         }
     }
 
-    fn track(&self, link: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<Leg>> {
-        let (edge, reversed) = link;
+    fn track(
+        &self,
+        (edge, reversed): (usize, bool),
+        from: &Sample,
+        to: &Sample,
+    ) -> Result<Motion<Leg>, Blocked> {
+        let path = self.path(&self.graph.edges[edge], reversed, from, to);
+        self.cell.follow(&path, from, to).map(|track| self.leg(track))
+    }
+
+    fn around(
+        &self,
+        (edge, reversed): (usize, bool),
+        from: &Sample,
+        to: &Sample,
+    ) -> Option<Motion<Leg>> {
         self.along(&self.graph.edges[edge], reversed, from, to)
     }
 

@@ -48,6 +48,17 @@ pub enum TrackFailure {
     Elsewhere,
 }
 
+/// Where along a tool path it could not be followed, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blocked {
+    /// Why.
+    pub why: TrackFailure,
+    /// Share of the path's length up to there, 0…1.
+    pub share: f64,
+    /// Value of the redundancy parameter there. \[rad\]
+    pub redundancy: f64,
+}
+
 /// Farthest that the pad may leave the planned line between two joint vectors. \[m\]
 const LINE_TOLERANCE: f64 = 1e-4;
 /// Most times that a step of the line is halved to stay within [`LINE_TOLERANCE`].
@@ -124,31 +135,34 @@ impl Workcell<'_> {
     /// line.
     ///
     /// # Errors
-    /// Says what ended the branch, see [`TrackFailure`]. [`Self::detour`] may still find a way.
-    pub fn follow(
-        &self,
-        path: &ToolPath,
-        from: &Sample,
-        to: &Sample,
-    ) -> Result<Track, TrackFailure> {
+    /// Says what ended the branch and where. [`Self::detour`] may still find a way.
+    pub fn follow(&self, path: &ToolPath, from: &Sample, to: &Sample) -> Result<Track, Blocked> {
+        let last = path.stations() - 1;
+        let redundancy = |station: usize| {
+            from.redundancy + path.share(station) * (to.redundancy - from.redundancy)
+        };
+        let blocked = |station: usize, why: TrackFailure| Blocked {
+            why,
+            share: path.share(station),
+            redundancy: redundancy(station),
+        };
         if from.branch != to.branch {
-            return Err(TrackFailure::Elsewhere);
+            return Err(blocked(last, TrackFailure::Elsewhere));
         }
         let mut run = Run::new(*self, path, from);
-        for station in 1..path.stations() {
-            let share = path.share(station);
-            let redundancy = from.redundancy + share * (to.redundancy - from.redundancy);
-            let pose = path.pose(station);
-            let q = run.solve(&pose, redundancy, &run.last.q)?;
-            run.step(Place { share: 1.0, q, redundancy, pose })?;
+        for station in 1..=last {
+            let (redundancy, pose) = (redundancy(station), path.pose(station));
+            run.solve(&pose, redundancy, &run.last.q)
+                .and_then(|q| run.step(Place { share: 1.0, q, redundancy, pose }))
+                .map_err(|why| blocked(station, why))?;
         }
         if !arrives(self.arm.limits(), &run.last.q, &to.q) {
-            return Err(TrackFailure::Elsewhere);
+            return Err(blocked(last, TrackFailure::Elsewhere));
         }
-        if !self.world.path_free(&run.track.joints, ToolContact::Allowed) {
-            return Err(TrackFailure::Collision);
+        match self.world.unproven(&run.track.joints, ToolContact::Allowed) {
+            None => Ok(run.track),
+            Some(knot) => Err(blocked(run.station_at(knot), TrackFailure::Collision)),
         }
-        Ok(run.track)
     }
 }
 
@@ -184,8 +198,8 @@ pub(crate) struct Run<'a> {
     branch: Branch,
     contact_in_tip: Isometry3<f64>,
     tip_in_contact: Isometry3<f64>,
-    /// The station that was reached last.
-    station: usize,
+    /// How many joint vectors the track has up to each station that was reached.
+    knots: Vec<usize>,
     pub(crate) last: Place,
     pub(crate) track: Track,
 }
@@ -200,7 +214,7 @@ impl<'a> Run<'a> {
             branch: from.branch,
             contact_in_tip,
             tip_in_contact: contact_in_tip.inverse(),
-            station: 0,
+            knots: vec![1],
             last: Place { share: 0.0, q, redundancy, pose },
             track: Track { joints: vec![q], line: vec![pose.translation.vector.into()] },
         }
@@ -225,9 +239,14 @@ impl<'a> Run<'a> {
     /// Goes on to a place at the next station, the redundancy parameter changing evenly.
     pub(crate) fn step(&mut self, to: Place) -> Result<(), TrackFailure> {
         self.span(Place { share: 0.0, ..self.last }, to, MAX_HALVINGS)?;
-        self.station += 1;
+        self.knots.push(self.track.joints.len());
         self.last = to;
         Ok(())
+    }
+
+    /// The last station up to a joint vector of the track.
+    pub(crate) fn station_at(&self, knot: usize) -> usize {
+        last_up_to(&self.knots, knot)
     }
 
     /// Appends the joint vectors after `a` up to `b`, halving the way while the pad leaves the line
@@ -238,7 +257,7 @@ impl<'a> Run<'a> {
         }
         let middle: JointVector = std::array::from_fn(|j| 0.5 * (a.q[j] + b.q[j]));
         let share = 0.5 * (a.share + b.share);
-        let pose = self.path.between(self.station, share);
+        let pose = self.path.between(self.knots.len() - 1, share);
         let pad = self.cell.arm.tip_pose(&middle) * self.contact_in_tip;
         if (pad.translation.vector - pose.translation.vector).norm() > LINE_TOLERANCE {
             if halvings == 0 {
@@ -256,6 +275,12 @@ impl<'a> Run<'a> {
     }
 }
 
+/// The last of the stations, given how many joint vectors there are up to each, that is not beyond
+/// joint vector `knot`. The first joint vector is the first station's.
+fn last_up_to(counts: &[usize], knot: usize) -> usize {
+    counts.partition_point(|&count| count <= knot + 1).max(1) - 1
+}
+
 /// The angle from a station's line direction to a heading, about the normal. \[rad\]
 fn turn(station: &Station, heading: f64) -> f64 {
     let d = direction(&station.normal, heading);
@@ -267,4 +292,16 @@ fn turn(station: &Station, heading: f64) -> f64 {
 #[must_use]
 pub(crate) fn wrap(angle: f64) -> f64 {
     angle - (angle / std::f64::consts::TAU).round() * std::f64::consts::TAU
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_vector_belongs_to_the_station_at_or_before_it() {
+        // One joint vector between the first two stations.
+        let stations: Vec<usize> = (0..4).map(|knot| last_up_to(&[1, 3, 4], knot)).collect();
+        assert_eq!(stations, [0, 0, 1, 2]);
+    }
 }

@@ -191,7 +191,7 @@ fn try_edges(s: &Setting, tries: usize, y: (f64, f64), z: (f64, f64)) -> (usize,
                     }
                     continue;
                 }
-                Err(failed) => failed,
+                Err(blocked) => blocked.why,
             };
             let Some(track) = s.cell().detour(&path, &[*f], &[*t]) else { continue };
             let again = s.cell().detour(&path, &[*f], &[*t]).expect("as before");
