@@ -136,6 +136,17 @@ pub fn shortest<C: Cost, M: Moves>(
     loop {
         rounds += 1;
         search.update(dirty);
+        if let Some(p) = search.cut_off() {
+            dirty = p;
+            if search.into[p].reopen() {
+                jumps[search.visited[p]] = 0;
+            } else {
+                left_out(search.visited[p]);
+                search.leave_out(p);
+                best = None;
+            }
+            continue;
+        }
         let (estimate, keys) = search.cheapest();
         let open: Vec<usize> = (0..keys.len()).filter(|&p| !made.contains_key(&keys[p])).collect();
         let enough = best.as_ref().is_some_and(|(cost, _)| estimate >= cost * (1.0 - GAP));
@@ -158,7 +169,7 @@ pub fn shortest<C: Cost, M: Moves>(
                     *jumps += usize::from(edges.kind(a, b) == Kind::Jump);
                     edges.learn(a, b, motion.cost);
                     if *jumps >= MAX_JUMPS {
-                        edges.close_jumps(|_, _| true);
+                        edges.spare_jumps();
                     }
                     made.insert(keys[p], motion);
                 }
@@ -256,6 +267,11 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
             }
             self.labels.push(labels);
         }
+    }
+
+    /// The first place into whose layer no motion leads any more.
+    fn cut_off(&self) -> Option<usize> {
+        self.labels.iter().position(|labels| labels.iter().all(|(cost, _)| cost.is_infinite()))
     }
 
     /// The path that is cheapest under the estimates, as its motions, and its estimated cost.
@@ -371,6 +387,8 @@ enum Kind {
     Doubtful,
     /// To be jumped; an estimate.
     Jump,
+    /// A jump that is not tried, as enough others were made.
+    Spare,
     /// The motion was made, or cannot be made: the cost is true.
     Known,
 }
@@ -405,7 +423,8 @@ impl Edges {
         match kind {
             Kind::Track => straight * ratio(kind, 1.0),
             Kind::Doubtful => straight * ratio(kind, DOUBT * ratio(Kind::Track, 1.0)),
-            Kind::Jump | Kind::Known => self.lift + straight * ratio(Kind::Jump, 1.0),
+            Kind::Jump => self.lift + straight * ratio(kind, 1.0),
+            Kind::Spare | Kind::Known => f32::INFINITY,
         }
     }
 
@@ -445,28 +464,43 @@ impl Edges {
         let [made, failed] = &mut self.doubtful;
         *failed += 1;
         if *failed >= MAX_FAILED_DOUBTFUL * (*made + 1) {
-            for at in 0..self.kind.len() {
-                if self.kind[at] == Kind::Doubtful {
-                    self.set(at, Kind::Jump);
-                }
-            }
+            self.turn(Kind::Doubtful, Kind::Jump);
         }
     }
 
     fn close(&mut self, a: usize, b: usize) {
-        let at = a * self.width + b;
-        self.kind[at] = Kind::Known;
-        self.estimate[at] = f32::INFINITY;
+        self.set(a * self.width + b, Kind::Known);
     }
 
     /// Gives up the jumps between the samples (row, column) that `which` picks, but those made.
     fn close_jumps(&mut self, which: impl Fn(usize, usize) -> bool) {
-        for (i, kind) in self.kind.iter_mut().enumerate() {
-            if *kind == Kind::Jump && which(i / self.width, i % self.width) {
-                *kind = Kind::Known;
-                self.estimate[i] = f32::INFINITY;
+        for at in 0..self.kind.len() {
+            let is_jump = matches!(self.kind[at], Kind::Jump | Kind::Spare);
+            if is_jump && which(at / self.width, at % self.width) {
+                self.set(at, Kind::Known);
             }
         }
+    }
+
+    /// Puts off the jumps that were not made.
+    fn spare_jumps(&mut self) {
+        self.turn(Kind::Jump, Kind::Spare);
+    }
+
+    /// Offers the jumps again that were put off; whether there were any.
+    fn reopen(&mut self) -> bool {
+        self.turn(Kind::Spare, Kind::Jump)
+    }
+
+    fn turn(&mut self, from: Kind, to: Kind) -> bool {
+        let mut any = false;
+        for at in 0..self.kind.len() {
+            if self.kind[at] == from {
+                self.set(at, to);
+                any = true;
+            }
+        }
+        any
     }
 
     /// Whether no edge is left.
@@ -621,5 +655,69 @@ mod tests {
         assert_eq!(left_out, [2]);
         assert_eq!(path.layers, [0, 1, 3]);
         assert_eq!(path.motions.len(), 3);
+    }
+
+    /// Jumps alone, many of which fail.
+    struct Gates;
+
+    fn opens(from: &JointVector, to: &JointVector) -> bool {
+        (from[0] * 7919.0 + to[0] * 104_729.0).sin() > 0.3
+    }
+
+    impl Moves for Gates {
+        type Path = ();
+        fn link(&self, _: usize, _: usize) -> Link {
+            Link::Jump
+        }
+        fn track(&self, _: (usize, bool), _: &Sample, _: &Sample) -> Result<Motion<()>, Blocked> {
+            unreachable!("no layers are linked along the surface")
+        }
+        fn around(&self, _: (usize, bool), _: &Sample, _: &Sample) -> Option<Motion<()>> {
+            unreachable!("no layers are linked along the surface")
+        }
+        fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
+            let start = from.map_or([0.0; MAX_DOF], |s| s.q);
+            let is_open = from.is_none() || opens(&start, &to.q);
+            is_open.then(|| Motion { cost: 1.0 + straight(&start, &to.q), path: () })
+        }
+        fn lifts(&self, _: &Sample) -> bool {
+            true
+        }
+        fn jump_estimate(&self, straight: f64) -> f64 {
+            1.0 + straight
+        }
+    }
+
+    #[test]
+    fn no_layer_is_left_out_that_some_path_visits() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let (mut whole, mut cut) = (0, 0);
+        for trial in 0..300 {
+            let (mut layers, _) = layers(&mut rng, 2 + trial % 5);
+            // With more, a layer may be given up before all jumps into it have failed.
+            layers.iter_mut().for_each(|layer| layer.truncate(3));
+            let mut reached = vec![true; layers[0].len()];
+            for pair in layers.windows(2) {
+                let comes = |to: &Sample| {
+                    pair[0].iter().zip(&reached).any(|(from, r)| *r && opens(&from.q, &to.q))
+                };
+                reached = pair[1].iter().map(comes).collect();
+            }
+            let mut left_out = 0;
+            let source = [0.0; MAX_DOF];
+            let path = shortest(&Effort, &[false; MAX_DOF], &source, &layers, &Gates, &mut |_| {
+                left_out += 1
+            });
+            assert_eq!(path.layers.len() + left_out, layers.len());
+            assert!(path.cost.is_finite());
+            if reached.contains(&true) {
+                assert_eq!(left_out, 0, "trial {trial}");
+                whole += 1;
+            } else {
+                assert!(left_out > 0);
+                cut += 1;
+            }
+        }
+        assert!(whole > 50 && cut > 20, "{whole} whole, {cut} cut");
     }
 }
