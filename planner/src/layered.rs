@@ -137,13 +137,13 @@ pub fn shortest<C: Cost, M: Moves>(
         rounds += 1;
         search.update(dirty);
         if let Some(p) = search.cut_off() {
-            dirty = p;
-            if search.into[p].reopen() {
-                jumps[search.visited[p]] = 0;
+            if let Some(opened) = (0..=p).rev().find(|&before| search.into[before].reopen()) {
+                jumps[search.visited[opened]] = 0;
+                dirty = opened;
             } else {
                 left_out(search.visited[p]);
                 search.leave_out(p);
-                best = None;
+                (dirty, best) = (p, None);
             }
             continue;
         }
@@ -692,10 +692,12 @@ mod tests {
     fn no_layer_is_left_out_that_some_path_visits() {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let (mut whole, mut cut) = (0, 0);
-        for trial in 0..300 {
+        for trial in 0..2000 {
             let (mut layers, _) = layers(&mut rng, 2 + trial % 5);
-            // With more, a layer may be given up before all jumps into it have failed.
-            layers.iter_mut().for_each(|layer| layer.truncate(3));
+            // With more than twelve jumps into it, a layer may be given up before all have failed.
+            for (l, layer) in layers.iter_mut().enumerate() {
+                layer.truncate(3 + l % 2);
+            }
             let mut reached = vec![true; layers[0].len()];
             for pair in layers.windows(2) {
                 let comes = |to: &Sample| {
@@ -718,6 +720,6 @@ mod tests {
                 cut += 1;
             }
         }
-        assert!(whole > 50 && cut > 20, "{whole} whole, {cut} cut");
+        assert!(whole > 500 && cut > 200, "{whole} whole, {cut} cut");
     }
 }
