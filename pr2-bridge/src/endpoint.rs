@@ -66,7 +66,7 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     let mut told = Told::default();
     let mut due_ns = now_ns();
     let mut disabled = false;
-    let mut stopped = false;
+    let mut stopped = None;
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
         let health = health(&link, &ear, now_ns());
@@ -78,7 +78,7 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
                 // The driver tells it up to a second later.
                 state.status |= status::HALTED;
             }
-            if stopped {
+            if stopped.is_some() {
                 state.status |= status::SETPOINT_TIMEOUT;
             }
             if let Some((sequence, deadline)) = stream.in_force(state.stamp_ns) {
@@ -105,12 +105,9 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
             stream.let_go();
         }
         let now = now_ns();
-        let before = std::mem::replace(&mut stopped, stream.has_stopped(now));
-        if stopped && !before {
-            tracing::warn!(
-                "no setpoint is followed: they have ceased, begin elsewhere than the arm is, or a \
-                 message would come too late (is --delay too short?); the arm comes to rest"
-            );
+        let before = std::mem::replace(&mut stopped, stream.stopped(now));
+        if let Some(why) = stopped.filter(|_| before.is_none()) {
+            tracing::warn!("{why}: the arm comes to rest");
         }
         if now >= due_ns {
             due_ns = now.max(due_ns + args.period * 1_000_000);

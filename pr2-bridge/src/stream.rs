@@ -66,6 +66,27 @@ pub struct Message {
     pub points: Vec<Point>,
 }
 
+/// Why setpoints are not followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// None come, or those of another executor.
+    Ceased,
+    /// A message would have come too late.
+    Late,
+    /// They are too far from the arm to begin with.
+    Far,
+}
+
+impl std::fmt::Display for Stop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Ceased => "setpoints have ceased",
+            Self::Late => "a message would come too late (is --delay too short?)",
+            Self::Far => "setpoints are too far from the arm to begin with",
+        })
+    }
+}
+
 /// A setpoint that is not sent yet.
 #[derive(Clone, Copy, Debug)]
 struct Due {
@@ -100,9 +121,8 @@ pub struct Stream {
     rest: Option<(Joints, u64)>,
     /// Whether the last message stands still where it ends.
     stands: bool,
-    /// Whether following ended because setpoints ceased or came too late, or does not begin as they
-    /// are too far from the arm.
-    stopped: bool,
+    /// Why following ended or does not begin, until it does.
+    stopped: Option<Stop>,
     last_deadline_ns: Option<u64>,
     last_sequence: u64,
     /// Messages made.
@@ -123,7 +143,7 @@ impl Stream {
             known: VecDeque::with_capacity(REMEMBERED),
             rest: None,
             stands: false,
-            stopped: false,
+            stopped: None,
             last_deadline_ns: None,
             last_sequence: 0,
             made: 0,
@@ -146,7 +166,7 @@ impl Stream {
         let (sequence, deadline_ns) = (setpoint.sequence, setpoint.deadline_ns);
         if sequence <= self.last_sequence {
             // Another executor, which counts from 1 again.
-            self.stop();
+            self.stop(Stop::Ceased);
         }
         self.last_deadline_ns = Some(deadline_ns);
         self.last_sequence = sequence;
@@ -170,7 +190,9 @@ impl Stream {
     fn begin(&mut self, setpoint: &Setpoint, q: &Joints, measured: &Joints) {
         let far = (0..DOF).any(|j| (q[j] - measured[j]).abs() > self.rules.start_tolerance);
         self.refused += u64::from(far);
-        self.stopped |= far;
+        if far {
+            self.stopped.get_or_insert(Stop::Far);
+        }
         let playout = Playout::begin(self.rules.delay_ns, setpoint.sequence, setpoint.deadline_ns);
         let moves = self.rest.is_some_and(|(_, at_ns)| at_ns > playout.at_ns());
         let mode = setpoint.mode;
@@ -188,7 +210,7 @@ impl Stream {
             last: (*q, [0.0; DOF]),
             offset: std::array::from_fn(|j| from[j] - q[j]),
         });
-        self.stopped = false;
+        self.stopped = None;
         self.stands = false;
     }
 
@@ -216,9 +238,11 @@ impl Stream {
     }
 
     /// Follows no longer: the arm is on its way to rest on the last message.
-    fn stop(&mut self) {
+    fn stop(&mut self, why: Stop) {
         self.waiting.clear();
-        self.stopped |= self.following.take().is_some();
+        if self.following.take().is_some() {
+            self.stopped = Some(why);
+        }
     }
 
     /// Whether setpoints are being followed.
@@ -227,16 +251,16 @@ impl Stream {
         self.following.is_some()
     }
 
-    /// Whether setpoints have ceased, came too late, or are too far from the arm to begin with. The
-    /// arm is then on its way to rest on the last message, or rests there, until it follows again.
-    pub fn has_stopped(&mut self, now_ns: u64) -> bool {
+    /// Why no setpoint is followed: the arm is then on its way to rest on the last message, or rests
+    /// there, until it follows again.
+    pub fn stopped(&mut self, now_ns: u64) -> Option<Stop> {
         let ceased = self
             .last_deadline_ns
             .is_some_and(|last| now_ns > last.saturating_add(self.rules.timeout_ns));
         if ceased && self.waiting.is_empty() {
-            self.stop();
+            self.stop(Stop::Ceased);
         }
-        ceased || self.stopped
+        if ceased { Some(Stop::Ceased) } else { self.stopped }
     }
 
     /// The newest setpoint that was in force at a moment, with its deadline.
@@ -255,7 +279,7 @@ impl Stream {
             // Too late to splice: the arm is already slowing down on the last message. A stamp in
             // the past would make it jump.
             self.late += 1;
-            self.stop();
+            self.stop(Stop::Late);
             return None;
         }
         f.sent_ns = last.at_ns;
@@ -344,9 +368,11 @@ mod tests {
         stream.take(&setpoint(1, 0.1, 0.0), &[0.0; DOF]);
         assert!(!stream.follows() && stream.refused == 1);
         // It says that it waits, so that the executor's setpoints come to the arm.
-        assert!(stream.has_stopped(1001 * MS) && stream.in_force(2000 * MS).is_none());
+        assert!(
+            stream.stopped(1001 * MS) == Some(Stop::Far) && stream.in_force(2000 * MS).is_none()
+        );
         stream.take(&setpoint(2, 0.01, 0.0), &[0.0; DOF]);
-        assert!(stream.follows() && !stream.has_stopped(1002 * MS));
+        assert!(stream.follows() && stream.stopped(1002 * MS).is_none());
         assert_eq!(stream.in_force(2000 * MS), Some((2, 1002 * MS)));
         // The process stalled: its stamp would lie in the past.
         assert_eq!(stream.message(1063 * MS), None);
@@ -436,17 +462,17 @@ mod tests {
         let rest_ns = message.start_ns + message.points.last().expect("one").after_ns;
         stream.take(&setpoint(21, 0.021, 1.0), &measured);
         assert_eq!(stream.message(1090 * MS), None);
-        assert!(stream.late == 1 && stream.has_stopped(1021 * MS));
+        assert!(stream.late == 1 && stream.stopped(1021 * MS) == Some(Stop::Late));
         // The executor follows the arm, which has not come to rest: not yet.
         measured[0] = 0.1;
         stream.take(&setpoint(100, 0.1, 0.0), &measured);
-        assert!(!stream.follows() && stream.has_stopped(1100 * MS));
+        assert!(!stream.follows() && stream.stopped(1100 * MS).is_some());
         let k = (rest_ns - 60 * MS) / MS - 1000 + 1;
         stream.take(&setpoint(k, 0.14, 0.0), &[0.14; DOF].map(|q| q * measured[0].signum()));
         assert!(!stream.follows(), "the other joints are far");
         measured[0] = 0.14;
         stream.take(&setpoint(k + 1, 0.14, 0.0), &measured);
-        assert!(stream.follows() && !stream.has_stopped((1001 + k) * MS));
+        assert!(stream.follows() && stream.stopped((1001 + k) * MS).is_none());
     }
 
     #[test]
@@ -460,7 +486,7 @@ mod tests {
             }
         }
         assert_eq!(count, 1);
-        assert!(!stream.has_stopped(1120 * MS) && stream.follows());
-        assert!(stream.has_stopped(1121 * MS) && !stream.follows());
+        assert!(stream.stopped(1120 * MS).is_none() && stream.follows());
+        assert!(stream.stopped(1121 * MS) == Some(Stop::Ceased) && !stream.follows());
     }
 }
