@@ -23,6 +23,10 @@ const SPACING_NS: u64 = 4_000_000;
 /// A message begins so much before the last one's setpoints end: a moment later, as rounding may
 /// make it, the controller would take the velocity there as 0. \[ns\]
 const EARLY_NS: u64 = 10_000;
+/// Where following begins, the message begins so much before the first setpoint, if there is time: the
+/// way there from where the controller holds, which is not exactly where the arm is measured, is no
+/// jump then. \[ns\]
+const BLEND_NS: u64 = 20_000_000;
 /// A stop takes at least this long. \[s\]
 const SHORTEST_STOP: f64 = 0.02;
 /// What a message's way to the controller may take. \[ns\]
@@ -273,7 +277,12 @@ impl Stream {
     pub fn message(&mut self, now_ns: u64) -> Option<Message> {
         let f = self.following.as_mut()?;
         let last = *self.waiting.back()?;
-        let from = f.sent_ns;
+        let from = if f.sent_ns == f.began_ns {
+            let soonest = now_ns + WAY_NS + 2 * EARLY_NS;
+            f.began_ns.saturating_sub(BLEND_NS).max(soonest).min(f.began_ns)
+        } else {
+            f.sent_ns
+        };
         let start_ns = from.saturating_sub(EARLY_NS);
         if start_ns <= now_ns + WAY_NS {
             // Too late to splice: the arm is already slowing down on the last message. A stamp in
@@ -414,6 +423,25 @@ mod tests {
                 from = to;
             }
         }
+    }
+
+    #[test]
+    fn following_begins_without_a_jump() {
+        let mut stream = Stream::new(RULES);
+        let mut controller = Controller { segments: Vec::new() };
+        // The controller holds at 0, the arm is measured a little beside it.
+        let (mut before, mut fastest) = (0.0, 0.0f64);
+        for k in 1..=400u64 {
+            stream.take(&setpoint(k, 0.002, 0.0), &[0.001; DOF]);
+            if k % 20 == 0 {
+                stream.message((1000 + k) * MS).iter().for_each(|m| controller.take(m));
+            }
+            let [q, _] = controller.at((1000 + k) * MS);
+            fastest = fastest.max((q - before).abs() / 1e-3);
+            before = q;
+        }
+        assert!((before - 0.002).abs() < 1e-3, "{before}");
+        assert!(fastest < 0.1, "{fastest} rad/s");
     }
 
     #[test]

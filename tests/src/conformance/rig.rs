@@ -18,14 +18,15 @@ pub(super) const PERIOD_NS: u64 = 1_000_000;
 
 /// What gives the cycles their times.
 pub trait Clock {
-    /// Waits for the next cycle; its time. \[ns\]
-    fn tick(&mut self) -> u64;
+    /// Waits for the next cycle; when it is, and when it should have been. \[ns\]
+    fn tick(&mut self) -> (u64, u64);
 }
 
 /// `CLOCK_MONOTONIC`, for an endpoint in another process.
 impl Clock for Grid {
-    fn tick(&mut self) -> u64 {
-        self.wait().now_ns
+    fn tick(&mut self) -> (u64, u64) {
+        let tick = self.wait();
+        (tick.now_ns, tick.due_ns + tick.skipped * PERIOD_NS)
     }
 }
 
@@ -48,9 +49,9 @@ impl VirtualClock {
 }
 
 impl Clock for VirtualClock {
-    fn tick(&mut self) -> u64 {
+    fn tick(&mut self) -> (u64, u64) {
         self.0.set(self.0.get() + PERIOD_NS);
-        self.0.get()
+        (self.0.get(), self.0.get())
     }
 }
 
@@ -106,7 +107,7 @@ pub struct Rig<H, C> {
 impl<H: Hardware, C: Clock> Rig<H, C> {
     /// An endpoint of this arm.
     pub fn new(hardware: H, mut clock: C, arm: &Arm) -> Self {
-        let now_ns = clock.tick();
+        let (now_ns, _) = clock.tick();
         Self { arm: arm.clone(), now_ns, sequence: 0, newest: None, hardware, clock }
     }
 
@@ -115,7 +116,8 @@ impl<H: Hardware, C: Clock> Rig<H, C> {
         &mut self,
         command: Option<&Command>,
     ) -> Result<Option<JointStates>, PortError> {
-        self.now_ns = self.clock.tick();
+        let (now_ns, due_ns) = self.clock.tick();
+        self.now_ns = now_ns;
         let state = self.hardware.read()?;
         self.newest = state.or(self.newest);
         if let Some(command) = command {
@@ -123,7 +125,8 @@ impl<H: Hardware, C: Clock> Rig<H, C> {
             let mut setpoint = Setpoint::zeroed();
             setpoint.sequence = self.sequence;
             setpoint.stamp_ns = self.now_ns;
-            setpoint.deadline_ns = self.now_ns + PERIOD_NS;
+            // On the grid, as the executor's.
+            setpoint.deadline_ns = due_ns + PERIOD_NS;
             let dof = self.arm.dof();
             setpoint.positions[..dof].copy_from_slice(&command.q[..dof]);
             setpoint.velocities[..dof].copy_from_slice(&command.v[..dof]);
