@@ -78,7 +78,10 @@ pub fn checks<H: Hardware, C: Clock>() -> Vec<Check<H, C>> {
         Check { moves: true, ..check("follow", "each joint follows, and no other moves", follow) },
         check("watchdog", "when setpoints cease it stops by itself, and says so", watchdog),
         check("again", "after a stop it follows setpoints that begin where it is", again),
-        Check { dares: true, ..check("refuse", "after a stop it follows none from afar", refuse) },
+        Check {
+            dares: true,
+            ..check("refuse", "after a stop it follows none from afar, and says so", refuse)
+        },
         Check { dares: true, ..check("nonsense", "NaN and a wrong count move nothing", nonsense) },
         check("disable", "asked to, it turns the motors off, and on again", disable),
     ]
@@ -317,6 +320,9 @@ fn refuse<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<(
     }
     rig.keep(&away, ms(300))?;
     rig.near(&q, terms.tolerance, "after setpoints from afar")?;
+    if !rig.has(status::SETPOINT_TIMEOUT) {
+        return broken("it does not say that it follows none of the setpoints from afar".into());
+    }
     let command = rig.at(rig.measured());
     Ok(rig.keep(&command, ms(100))?)
 }
