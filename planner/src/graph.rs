@@ -146,8 +146,8 @@ impl Graph {
 
 /// Builds the graph over the patches that `reached` marks: each patch's nearest neighbours
 /// within the radius, in the union of both directions, joined where a surface line exists and
-/// some branch can be followed along it: at one redundancy value, or else with a detour. What `before` found between the
-/// first patches, which must be the same, is taken over.
+/// some branch can be followed along it: at one redundancy value, or else with a detour. What
+/// `before` found between the first patches, which must be the same, is taken over.
 #[must_use]
 pub fn build(
     cell: Workcell<'_>,
