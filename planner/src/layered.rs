@@ -115,7 +115,7 @@ const DOUBT: f32 = 1.2;
 const MAX_FAILED_DOUBTFUL: usize = 8;
 
 /// The cheapest path from `source` through one sample of each layer. A layer without samples, or
-/// into which no motion is found, is left out; `left_out` is called with it.
+/// into or out of which no motion is found, is left out; `left_out` is called with it.
 pub fn shortest<C: Cost, M: Moves>(
     cost: &C,
     continuous: &[bool; MAX_DOF],
@@ -130,21 +130,20 @@ pub fn shortest<C: Cost, M: Moves>(
     let problem = Problem { cost, continuous, source, layers, moves };
     let mut search = Search::new(problem, visited);
     let mut made: HashMap<Key, Motion<M::Path>> = HashMap::new();
-    let (mut jumps, mut failed_jumps) = (vec![0usize; layers.len()], vec![0usize; layers.len()]);
     let mut best: Option<(f64, Vec<Key>)> = None;
     let (mut rounds, mut tried, mut dirty) = (0, 0, 0);
     loop {
         rounds += 1;
         search.update(dirty);
         if let Some(p) = search.cut_off() {
-            if let Some(opened) = (0..=p).rev().find(|&before| search.into[before].reopen()) {
-                jumps[search.visited[opened]] = 0;
-                dirty = opened;
-            } else {
-                left_out(search.visited[p]);
-                search.leave_out(p);
-                (dirty, best) = (p, None);
-            }
+            dirty = match (0..=p).rev().find(|&before| search.into[before].reopen()) {
+                Some(opened) => opened,
+                None => {
+                    left_out(search.give_up(p));
+                    best = None;
+                    usize::MAX
+                }
+            };
             continue;
         }
         let (estimate, keys) = search.cheapest();
@@ -158,32 +157,22 @@ pub fn shortest<C: Cost, M: Moves>(
         let attempts: Vec<Result<Motion<M::Path>, Option<Blocked>>> =
             open.par_iter().map(|&p| search.attempt(p, &keys[p])).collect();
         dirty = usize::MAX;
-        let mut hopeless = Vec::new();
+        let mut hopeless = None;
         for (&p, attempt) in open.iter().zip(attempts) {
             let (a, b) = (keys[p].from.map_or(0, |(_, a)| a), keys[p].to.1);
             let edges = &mut search.into[p];
             dirty = dirty.min(p);
             match attempt {
                 Ok(motion) => {
-                    let jumps = &mut jumps[keys[p].to.0];
-                    *jumps += usize::from(edges.kind(a, b) == Kind::Jump);
                     edges.learn(a, b, motion.cost);
-                    if *jumps >= MAX_JUMPS {
-                        edges.spare_jumps();
-                    }
                     made.insert(keys[p], motion);
                 }
                 Err(Some(blocked)) => search.doubt(p, &keys[p], &blocked),
                 Err(None) if edges.kind(a, b) == Kind::Doubtful => edges.fall_back_to_jump(a, b),
                 Err(None) => {
                     edges.close(a, b);
-                    let lifts = |(l, s): (usize, usize)| moves.lifts(&layers[l][s]);
-                    let (from, to) = (keys[p].from.is_none_or(lifts), lifts(keys[p].to));
-                    edges.close_jumps(|row, column| (row == a && !from) || (column == b && !to));
-                    let failed = &mut failed_jumps[keys[p].to.0];
-                    *failed += 1;
-                    if *failed > MAX_FAILED_JUMPS || edges.is_closed() {
-                        hopeless.push(p);
+                    if search.strike(p, &keys[p]) && hopeless.is_none() {
+                        hopeless = Some(p);
                     }
                 }
             }
@@ -194,9 +183,8 @@ pub fn shortest<C: Cost, M: Moves>(
         {
             best = Some((cost, keys));
         }
-        for p in hopeless.into_iter().rev() {
-            left_out(search.visited[p]);
-            search.leave_out(p);
+        if let Some(p) = hopeless {
+            left_out(search.give_up(p));
             best = None;
         }
     }
@@ -226,6 +214,8 @@ struct Search<'a, C, M> {
     into: Vec<Edges>,
     /// The least cost to each sample and where it comes from.
     labels: Vec<Vec<(f32, u32)>>,
+    /// For each layer where a sample turned out not to, which samples the tool can be lifted off at.
+    lifts: Vec<Option<Vec<bool>>>,
 }
 
 impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
@@ -234,7 +224,55 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
             .into_par_iter()
             .map(|p| problem.edges(p.checked_sub(1).map(|b| visited[b]), visited[p]))
             .collect();
-        Self { problem, visited, into, labels: Vec::new() }
+        let lifts = vec![None; problem.layers.len()];
+        Self { problem, visited, into, labels: Vec::new(), lifts }
+    }
+
+    /// Whether the tool can be lifted off at a sample. Where it cannot, all samples of its layer are
+    /// looked at: they have much in common.
+    fn lifts(&mut self, (layer, sample): (usize, usize)) -> bool {
+        if let Some(known) = &self.lifts[layer] {
+            return known[sample];
+        }
+        let Problem { layers, moves, .. } = self.problem;
+        let lifts = moves.lifts(&layers[layer][sample]);
+        if !lifts {
+            self.lifts[layer] = Some(layers[layer].par_iter().map(|s| moves.lifts(s)).collect());
+        }
+        lifts
+    }
+
+    /// After a jump into place `p` that failed: gives up those that would fail for the same reason;
+    /// whether the others are given up too.
+    fn strike(&mut self, p: usize, key: &Key) -> bool {
+        let from = key.from.is_none_or(|from| self.lifts(from));
+        let to = self.lifts(key.to);
+        let off = |layer: Option<usize>| layer.and_then(|layer| self.lifts[layer].as_ref());
+        let (rows, columns) = (off(key.from.map(|(layer, _)| layer)), off(Some(key.to.0)));
+        let edges = &mut self.into[p];
+        edges.close_jumps(|row, column| {
+            rows.is_some_and(|lifts| !lifts[row]) || columns.is_some_and(|lifts| !lifts[column])
+        });
+        edges.failed_jumps += usize::from(from && to);
+        edges.failed_jumps > MAX_FAILED_JUMPS || edges.is_closed()
+    }
+
+    /// Leaves out the layer at place `p`, into which no motion leads; or the one before it, if no
+    /// jump can begin there. The layer that was left out.
+    fn give_up(&mut self, p: usize) -> usize {
+        let is_trap = |before: usize| {
+            let lifts = self.lifts[self.visited[before]].as_ref();
+            lifts.is_some_and(|lifts| {
+                lifts
+                    .iter()
+                    .zip(&self.labels[before])
+                    .all(|(lifts, (cost, _))| !lifts || cost.is_infinite())
+            })
+        };
+        let place = p.checked_sub(1).filter(|&before| is_trap(before)).unwrap_or(p);
+        let layer = self.visited[place];
+        self.leave_out(place);
+        layer
     }
 
     /// Takes a layer out of the path.
@@ -363,6 +401,8 @@ impl<C: Cost, M: Moves> Problem<'_, C, M> {
             lift: self.moves.jump_estimate(0.0) as f32,
             ratios: [(0.0, 0.0); 3],
             doubtful: [0; 2],
+            jumps: 0,
+            failed_jumps: 0,
         };
         for (q, from) in rows {
             for to in &self.layers[to] {
@@ -408,6 +448,9 @@ struct Edges {
     ratios: [(f32, f32); 3],
     /// Doubtful motions that were made, and that failed.
     doubtful: [usize; 2],
+    /// Jumps that were made, and that failed though the tool can be lifted off at both ends.
+    jumps: usize,
+    failed_jumps: usize,
 }
 
 impl Edges {
@@ -437,8 +480,12 @@ impl Edges {
         *sum += way / self.straight[at].max(1e-6);
         *seen += 1.0;
         self.doubtful[0] += usize::from(kind == Kind::Doubtful);
+        self.jumps += usize::from(kind == Kind::Jump);
         self.kind[at] = Kind::Known;
         self.estimate[at] = cost as f32;
+        if self.jumps >= MAX_JUMPS {
+            self.turn(Kind::Jump, Kind::Spare);
+        }
         for i in 0..self.kind.len() {
             if self.kind[i] != Kind::Known {
                 self.estimate[i] = self.guess(self.kind[i], self.straight[i]);
@@ -482,13 +529,9 @@ impl Edges {
         }
     }
 
-    /// Puts off the jumps that were not made.
-    fn spare_jumps(&mut self) {
-        self.turn(Kind::Jump, Kind::Spare);
-    }
-
     /// Offers the jumps again that were put off; whether there were any.
     fn reopen(&mut self) -> bool {
+        self.jumps = 0;
         self.turn(Kind::Spare, Kind::Jump)
     }
 
@@ -721,5 +764,58 @@ mod tests {
             }
         }
         assert!(whole > 500 && cut > 200, "{whole} whole, {cut} cut");
+    }
+
+    /// Tracks everywhere to the second layer, where the tool cannot be lifted off again.
+    struct Trap;
+
+    impl Moves for Trap {
+        type Path = ();
+        fn link(&self, from: usize, to: usize) -> Link {
+            match (from, to) {
+                (0, 1) => Link::Surface { edge: 0, reversed: false },
+                _ => Link::Jump,
+            }
+        }
+        fn track(
+            &self,
+            link: (usize, bool),
+            from: &Sample,
+            to: &Sample,
+        ) -> Result<Motion<()>, Blocked> {
+            let blocked = Blocked { why: TrackFailure::Collision, share: 0.5, redundancy: 0.0 };
+            self.around(link, from, to).ok_or(blocked)
+        }
+        fn around(&self, _: (usize, bool), from: &Sample, to: &Sample) -> Option<Motion<()>> {
+            Some(Motion { cost: straight(&from.q, &to.q), path: () })
+        }
+        fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
+            let start = from.map_or([0.0; MAX_DOF], |s| s.q);
+            let goes = self.lifts(to) && from.is_none_or(|from| self.lifts(from));
+            goes.then(|| Motion { cost: 1.0 + straight(&start, &to.q), path: () })
+        }
+        fn lifts(&self, at: &Sample) -> bool {
+            at.heading != 1.0
+        }
+        fn jump_estimate(&self, straight: f64) -> f64 {
+            1.0 + straight
+        }
+    }
+
+    #[test]
+    fn the_layer_that_no_jump_leaves_is_left_out_not_those_behind_it() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for _ in 0..50 {
+            let (mut layers, _) = layers(&mut rng, 5);
+            for (l, layer) in layers.iter_mut().enumerate() {
+                layer.iter_mut().for_each(|s| (s.heading, s.branch) = (l as f64, Branch(0)));
+            }
+            let mut left_out = Vec::new();
+            let source = [0.0; MAX_DOF];
+            let path = shortest(&Effort, &[false; MAX_DOF], &source, &layers, &Trap, &mut |l| {
+                left_out.push(l)
+            });
+            assert_eq!((path.layers, left_out), (vec![0, 2, 3, 4], vec![1]));
+        }
     }
 }
