@@ -1,9 +1,9 @@
 //! What is known of the motions between two layers.
 
-/// Jumps made into one layer after which no others are tried: they are dear, and their cost hardly
-/// depends on the sample.
+/// Jumps made between two layers after which the others are put off: they are dear, and their cost
+/// hardly depends on the sample.
 const MAX_JUMPS: usize = 3;
-/// Failed jumps into one layer after which it is left out.
+/// Failed jumps between two layers after which one of them is left out.
 const MAX_FAILED_JUMPS: usize = 12;
 /// How much longer a doubtful motion is taken to be, before one was made.
 const DOUBT: f32 = 1.2;
@@ -86,7 +86,7 @@ impl Edges {
         }
     }
 
-    /// Puts a true cost in place and re-estimates the others of its kind.
+    /// Puts a true cost in place and estimates the others anew.
     pub(super) fn learn(&mut self, a: usize, b: usize, cost: f64) {
         let at = a * self.width + b;
         let kind = self.kind[at];

@@ -85,7 +85,7 @@ pub trait Moves: Sync {
 /// The shortest path through the layers.
 #[derive(Clone, Debug)]
 pub struct LayeredPath<M> {
-    /// The layers that the path visits, ascending: all but those that nothing reaches.
+    /// The layers that the path visits, ascending: all but those that were left out.
     pub layers: Vec<usize>,
     /// The chosen sample of each visited layer.
     pub choice: Vec<usize>,

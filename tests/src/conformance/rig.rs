@@ -10,7 +10,7 @@ use nullsweep_ipc_types::ports::PortError;
 use nullsweep_ipc_types::{JointStates, Mode, Setpoint};
 use nullsweep_robot::{Arm, JointVector};
 
-use crate::clock::Grid;
+use crate::clock::{Grid, Tick};
 use crate::endpoint::Endpoint;
 
 /// Cycle time. \[ns\]
@@ -18,15 +18,14 @@ pub(super) const PERIOD_NS: u64 = 1_000_000;
 
 /// What gives the cycles their times.
 pub trait Clock {
-    /// Waits for the next cycle; when it is, and when it should have been. \[ns\]
-    fn tick(&mut self) -> (u64, u64);
+    /// Waits for the next cycle.
+    fn tick(&mut self) -> Tick;
 }
 
 /// `CLOCK_MONOTONIC`, for an endpoint in another process.
 impl Clock for Grid {
-    fn tick(&mut self) -> (u64, u64) {
-        let tick = self.wait();
-        (tick.now_ns, tick.due_ns + tick.skipped * PERIOD_NS)
+    fn tick(&mut self) -> Tick {
+        self.wait()
     }
 }
 
@@ -49,9 +48,9 @@ impl VirtualClock {
 }
 
 impl Clock for VirtualClock {
-    fn tick(&mut self) -> (u64, u64) {
+    fn tick(&mut self) -> Tick {
         self.0.set(self.0.get() + PERIOD_NS);
-        (self.0.get(), self.0.get())
+        Tick { due_ns: self.0.get(), now_ns: self.0.get(), skipped: 0 }
     }
 }
 
@@ -107,7 +106,7 @@ pub struct Rig<H, C> {
 impl<H: Hardware, C: Clock> Rig<H, C> {
     /// An endpoint of this arm.
     pub fn new(hardware: H, mut clock: C, arm: &Arm) -> Self {
-        let (now_ns, _) = clock.tick();
+        let now_ns = clock.tick().now_ns;
         Self { arm: arm.clone(), now_ns, sequence: 0, newest: None, hardware, clock }
     }
 
@@ -116,7 +115,7 @@ impl<H: Hardware, C: Clock> Rig<H, C> {
         &mut self,
         command: Option<&Command>,
     ) -> Result<Option<JointStates>, PortError> {
-        let (now_ns, due_ns) = self.clock.tick();
+        let Tick { due_ns, now_ns, skipped } = self.clock.tick();
         self.now_ns = now_ns;
         let state = self.hardware.read()?;
         self.newest = state.or(self.newest);
@@ -126,7 +125,7 @@ impl<H: Hardware, C: Clock> Rig<H, C> {
             setpoint.sequence = self.sequence;
             setpoint.stamp_ns = self.now_ns;
             // On the grid, as the executor's.
-            setpoint.deadline_ns = due_ns + PERIOD_NS;
+            setpoint.deadline_ns = due_ns + (skipped + 1) * PERIOD_NS;
             let dof = self.arm.dof();
             setpoint.positions[..dof].copy_from_slice(&command.q[..dof]);
             setpoint.velocities[..dof].copy_from_slice(&command.v[..dof]);
