@@ -1,8 +1,9 @@
 //! What timing a path of 10,000 knots takes, beside bang-bang velocity on the same path.
 
+use std::hint::black_box;
+
 use nullsweep_planner::timing::{Limits, bang_bang, smooth, timed};
 use nullsweep_robot::{ArmSpec, JointVector, Robot, Side};
-use std::hint::black_box;
 
 fn main() {
     divan::main();

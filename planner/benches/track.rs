@@ -6,14 +6,12 @@ use std::sync::LazyLock;
 
 use divan::{Bencher, black_box};
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use nullsweep_planner::collision::{Obstacle, Options, World};
-use nullsweep_planner::graph::Edge;
-use nullsweep_planner::reach::{Sample, Workcell, contact_pose, direction, heading_of};
-use nullsweep_planner::scan::Scan;
-use nullsweep_planner::surface::{Surface, SurfacePoint};
-use nullsweep_planner::tool::Tool;
-use nullsweep_planner::track::ToolPath;
-use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
+use nullsweep_collision::{Obstacle, Options, World};
+use nullsweep_planner::roadmap::{Edge, ToolPath};
+use nullsweep_planner::workcell::{Sample, Workcell, contact_pose, direction, heading_of};
+use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
+use nullsweep_surface::scan::Scan;
+use nullsweep_surface::sheet::{Surface, SurfacePoint};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

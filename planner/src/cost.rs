@@ -1,7 +1,6 @@
 //! What a joint motion costs.
 
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
-use serde::{Deserialize, Serialize};
 use wide::f32x8;
 
 /// The cost of a straight joint motion. Implement it for a cost of your own; every search in
@@ -92,16 +91,6 @@ impl<A: Cost, B: Cost> Cost for Weighted<A, B> {
         self.1.of_eight(displacement) * self.0 as f32
             + self.3.of_eight(displacement) * self.2 as f32
     }
-}
-
-/// The costs that have a name on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum CostKind {
-    /// [`Effort`].
-    Effort,
-    /// [`TaskTime`].
-    Time,
 }
 
 /// The velocity of each joint: the robot's limits, or one `v_max` for all where that is lower

@@ -2,19 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use nullsweep_planner::collision::{Obstacle, Options};
-use nullsweep_planner::cost::CostKind;
-use nullsweep_planner::formulation::{FormulationConfig, Method};
-use nullsweep_planner::graph::GraphConfig;
-use nullsweep_planner::patches::PatchConfig;
+use nullsweep_collision::{Obstacle, Options};
 use nullsweep_planner::pipeline::{Job, Outcome, StanceChoice, run};
+use nullsweep_planner::plan::{CostKind, Method, Profile};
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::scan::{CleanConfig, Placement, Region, clean_region, place};
-use nullsweep_planner::simulate;
-use nullsweep_planner::stance::{Stance, StanceSearch};
-use nullsweep_planner::timing::Profile;
-use nullsweep_planner::tool::Tool;
-use nullsweep_robot::{ArmSpec, Robot};
+use nullsweep_planner::roadmap::GraphConfig;
+use nullsweep_planner::tour::formulation::FormulationConfig;
+use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
+use nullsweep_robot::{ArmSpec, Robot, Tool};
+use nullsweep_surface::patches::PatchConfig;
+use nullsweep_surface::scan::{CleanConfig, Placement, Region, clean_region, place};
+use nullsweep_surface::simulate;
 
 /// An arm in the manner of industrial ones: shoulder and elbow parallel, a spherical wrist, the
 /// flange's x axis ahead.

@@ -5,13 +5,11 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use nullsweep_planner::collision::{Obstacle, ObstacleShape, Options, ToolContact, World};
-use nullsweep_planner::graph::Edge;
-use nullsweep_planner::reach::{Sample, Workcell, contact_pose, direction, heading_of};
-use nullsweep_planner::surface::SurfacePoint;
-use nullsweep_planner::tool::Tool;
-use nullsweep_planner::track::{ToolPath, Track, TrackFailure};
-use nullsweep_robot::{Arm, ArmSpec, JointVector, RedundantJoint, Robot, Side, Solutions};
+use nullsweep_collision::{Obstacle, ObstacleShape, Options, ToolContact, World};
+use nullsweep_planner::roadmap::{Edge, ToolPath, Track, TrackFailure};
+use nullsweep_planner::workcell::{Sample, Workcell, contact_pose, direction, heading_of};
+use nullsweep_robot::{Arm, ArmSpec, JointVector, RedundantJoint, Robot, Side, Solutions, Tool};
+use nullsweep_surface::sheet::SurfacePoint;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

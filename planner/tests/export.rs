@@ -1,11 +1,8 @@
 //! Plans as trajectories for other programs.
 
-use nullsweep_planner::cost::CostKind;
-use nullsweep_planner::export::{Format, write};
-use nullsweep_planner::formulation::Method;
-use nullsweep_planner::plan::{FORMAT, Plan, PlanKnot};
-use nullsweep_planner::timing::Profile;
-use nullsweep_planner::tool::Tool;
+use nullsweep_planner::plan::export::{Format, write};
+use nullsweep_planner::plan::{CostKind, FORMAT, Method, Plan, PlanKnot, Profile};
+use nullsweep_robot::Tool;
 
 fn plan(profile: Profile) -> Plan {
     let knot = |time_ns, q: f64, v: f64| PlanKnot {

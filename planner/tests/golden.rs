@@ -6,20 +6,18 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use nullsweep_planner::collision::{Obstacle, Options};
-use nullsweep_planner::cost::CostKind;
-use nullsweep_planner::formulation::{FormulationConfig, Method};
-use nullsweep_planner::graph::GraphConfig;
-use nullsweep_planner::patches::PatchConfig;
+use nullsweep_collision::{Obstacle, Options};
 use nullsweep_planner::pipeline::{Job, StanceChoice, run};
+use nullsweep_planner::plan::{CostKind, Method, Profile};
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::scan::{CleanConfig, CropBox, Placement, Region, clean_region, place};
-use nullsweep_planner::simulate::{self, SimulatedView};
-use nullsweep_planner::stance::Stance;
+use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::task::{self, TaskConfig, Tolerance};
-use nullsweep_planner::timing::Profile;
-use nullsweep_planner::tool::Tool;
-use nullsweep_robot::{ArmSpec, Robot, Side};
+use nullsweep_planner::tour::formulation::FormulationConfig;
+use nullsweep_planner::workcell::stance::Stance;
+use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
+use nullsweep_surface::patches::PatchConfig;
+use nullsweep_surface::scan::{CleanConfig, CropBox, Placement, Region, clean_region, place};
+use nullsweep_surface::simulate::{self, SimulatedView};
 
 /// What the digests below were taken with: see [`rounding`].
 const ROUNDING: u64 = 0x4c02_b0fa_2b1f_2259;
@@ -173,10 +171,10 @@ fn a_stance_is_chosen_as_ever() {
         let spec = ArmSpec::pr2(Side::Left);
         let arm = robot.arm(&spec).expect("an arm");
         let tool = Tool::default();
-        let search = nullsweep_planner::stance::StanceSearch {
+        let search = nullsweep_planner::workcell::stance::StanceSearch {
             bearings: 8,
             finalists: 4,
-            ..nullsweep_planner::stance::StanceSearch::of(&robot, &arm, &tool)
+            ..nullsweep_planner::workcell::stance::StanceSearch::of(&robot, &arm, &tool)
         };
         let job = Job {
             arm: spec,

@@ -1,21 +1,17 @@
 //! The whole way from a simulated scan to a plan file.
 
-use nullsweep_planner::collision::{Obstacle, Options};
-use nullsweep_planner::cost::CostKind;
-use nullsweep_planner::coverage;
-use nullsweep_planner::formulation::{FormulationConfig, Method};
-use nullsweep_planner::graph::GraphConfig;
-use nullsweep_planner::patches::PatchConfig;
+use nullsweep_collision::{Obstacle, Options};
 use nullsweep_planner::pipeline::{After, Job, Outcome, StanceChoice, run};
-use nullsweep_planner::plan::{Plan, PlanError};
+use nullsweep_planner::plan::{CostKind, Method, Plan, PlanError, Profile};
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::scan::{CleanConfig, Placement, Region, clean_region, place};
-use nullsweep_planner::simulate;
-use nullsweep_planner::stance::Stance;
-use nullsweep_planner::timing::Profile;
-use nullsweep_planner::tool::Tool;
-use nullsweep_planner::verify;
-use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
+use nullsweep_planner::roadmap::GraphConfig;
+use nullsweep_planner::sweep::{contact_motion, coverage};
+use nullsweep_planner::tour::formulation::FormulationConfig;
+use nullsweep_planner::workcell::stance::Stance;
+use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
+use nullsweep_surface::patches::PatchConfig;
+use nullsweep_surface::scan::{CleanConfig, Placement, Region, clean_region, place};
+use nullsweep_surface::simulate;
 
 fn seat() -> Region {
     let view = simulate::chair(1);
@@ -109,7 +105,7 @@ fn a_plan_goes_on_from_a_knot_and_survives_its_file() {
     for (plan, until) in [(&first.plan, first.plan.knots.len() / 3), (&second.plan, knot)] {
         let mut followed = plan.clone();
         followed.knots.truncate(until + 1);
-        let poses = verify::contact_motion(&followed, &third.arm);
+        let poses = contact_motion(&followed, &third.arm);
         let swept = coverage::swept(&third.scan, &poses, &followed.tool);
         for patch in visited(&third) {
             let points = &third.patches[patch].points;

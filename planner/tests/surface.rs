@@ -5,11 +5,11 @@ use std::f64::consts::PI;
 use nalgebra::{
     Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3,
 };
-use nullsweep_planner::coverage;
-use nullsweep_planner::scan::{self, CleanConfig, Placement, RawScan, Scan};
-use nullsweep_planner::simulate;
-use nullsweep_planner::surface::{Surface, SurfacePoint};
-use nullsweep_planner::tool::Tool;
+use nullsweep_planner::sweep::coverage;
+use nullsweep_robot::Tool;
+use nullsweep_surface::scan::{self, CleanConfig, Placement, RawScan, Scan};
+use nullsweep_surface::sheet::{Surface, SurfacePoint};
+use nullsweep_surface::simulate;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use nullsweep_planner::collision::Options;
+use nullsweep_collision::Options;
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::task::{self, Outcome, TaskConfig, Tolerance};
-use nullsweep_planner::tool::Tool;
-use nullsweep_robot::{ArmSpec, Robot, Side};
+use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
 
 /// Poses on a dome before the PR2: z into it, x upwards.
 fn dome() -> Vec<Isometry3<f64>> {

@@ -23,14 +23,18 @@ mod arm;
 mod chain;
 mod fingerprint;
 mod ik;
+mod joints;
 mod limits;
 mod pr2;
+mod tool;
 mod urdf;
 
 pub use arm::{Arm, ArmError, ArmSpec, HeldJoint, Jacobian};
 pub use ik::{Branch, InverseKinematics, RedundantJoint, Solution, Solutions};
+pub use joints::wrap;
 pub use limits::{JointLimits, LimitsError};
 pub use pr2::Side;
+pub use tool::Tool;
 pub use urdf::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, Robot, SafetyController,
     UrdfError,

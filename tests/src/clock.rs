@@ -53,9 +53,10 @@ pub fn sleep_until(due_ns: u64) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use std::thread;
     use std::time::Duration;
+
+    use super::*;
 
     #[test]
     fn missed_deadlines_are_skipped_on_the_same_grid() {

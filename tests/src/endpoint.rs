@@ -279,9 +279,10 @@ impl Endpoint {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nullsweep_ipc_types::Mode;
     use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    use super::*;
 
     const MS: u64 = 1_000_000;
 

@@ -1,10 +1,10 @@
 //! What an arm has swept, from the positions that were measured on it.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use nullsweep_planner::coverage;
 use nullsweep_planner::plan::Plan;
-use nullsweep_planner::scan::Scan;
+use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::{Arm, JointVector};
+use nullsweep_surface::scan::Scan;
 use serde::{Deserialize, Serialize};
 
 /// Shares of the surface that were swept.
@@ -50,13 +50,10 @@ pub fn swept(plan: &Plan, arm: &Arm, postures: impl Iterator<Item = JointVector>
 
 #[cfg(test)]
 mod tests {
+    use nullsweep_planner::plan::{CostKind, FORMAT, Method, Profile, SurfaceSample};
+    use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
+
     use super::*;
-    use nullsweep_planner::cost::CostKind;
-    use nullsweep_planner::formulation::Method;
-    use nullsweep_planner::plan::{FORMAT, SurfaceSample};
-    use nullsweep_planner::timing::Profile;
-    use nullsweep_planner::tool::Tool;
-    use nullsweep_robot::{ArmSpec, Robot, Side};
 
     /// A plan whose surface is these points of the contact frame at home.
     fn plan(arm: &Arm, points: &[([f64; 3], bool)]) -> Plan {

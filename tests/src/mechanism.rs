@@ -290,8 +290,9 @@ fn joint_efforts(commands: &[ActuatorCommand; JOINTS]) -> JointVector {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    use super::*;
 
     const MS: u64 = 1_000_000;
 

@@ -18,7 +18,7 @@ pub fn play(args: &[OsString]) -> Option<ExitCode> {
     }
     let own = std::iter::once(OsString::from(part.name())).chain(args[2..].iter().cloned());
     Some(match part {
-        Part::Planner => nullsweep_planner::cli::main(own),
+        Part::Planner => nullsweep_cli::main(own),
         Part::Executor => nullsweep_executor::main_with(own),
         Part::Mock => mock::main(own),
         Part::Sketch => publisher::main(own),

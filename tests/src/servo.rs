@@ -114,8 +114,9 @@ impl Plant for Servo {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    use super::*;
 
     fn arm() -> Arm {
         Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("the embedded PR2 has a right arm")

@@ -148,8 +148,9 @@ fn knot(arm: &Arm, time_from_start_ns: u64, q: &JointVector) -> Knot {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    use super::*;
 
     #[test]
     fn a_sketch_keeps_the_limits_and_comes_back() {

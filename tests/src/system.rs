@@ -2,8 +2,7 @@
 //! the tests begin and end.
 
 use std::ffi::OsString;
-use std::fs;
-use std::io;
+use std::{fs, io};
 
 use anyhow::Context;
 use nullsweep_ipc_types::Mode;

@@ -1,9 +1,8 @@
 //! Somebody who watches an executor from outside, as an operator's tools do: plan events,
 //! telemetry and commands, each wait bounded by a generous time.
 
-use std::fmt;
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{fmt, thread};
 
 use nullsweep_ipc_types::ports::{CommandClient, Ipc, IpcError, PortError, Receiver};
 use nullsweep_ipc_types::{

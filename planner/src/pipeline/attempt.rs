@@ -1,24 +1,25 @@
 //! One plan for one set of patches, and the patches that are put over what it leaves out.
 
 use nullsweep_robot::{JointVector, MAX_DOF, Robot};
+use nullsweep_surface::patches::{self, Patch, PatchConfig};
+use nullsweep_surface::scan::Scan;
+use nullsweep_surface::sheet::Surface;
 use rayon::prelude::*;
 
 use super::{Clock, Job, PipelineError};
-use crate::cost::{Cost, CostKind, Effort, TaskTime};
-use crate::coverage;
-use crate::formulation::{self, Method, Stop};
-use crate::graph::{self, Graph};
-use crate::layered;
-use crate::motion::{Leg, Mover};
-use crate::patches::{self, Patch, PatchConfig};
-use crate::plan::{Continues, FORMAT, Held, Plan, PlanKnot, SurfaceSample};
+use crate::cost::{Cost, Effort, TaskTime};
+use crate::motion::layered;
+use crate::motion::mover::{Leg, Mover};
+use crate::plan::{
+    Continues, CostKind, FORMAT, Held, Method, Plan, PlanKnot, Profile, SurfaceSample,
+};
 use crate::progress::Progress;
-use crate::reach::{Sample, Workcell, reach, redundancies};
-use crate::scan::Scan;
-use crate::stance::Stance;
-use crate::surface::Surface;
-use crate::timing::{self, Profile};
-use crate::verify;
+use crate::roadmap::{Graph, graph};
+use crate::sweep::{contact_motion, coverage};
+use crate::timing;
+use crate::tour::formulation::{self, Stop};
+use crate::workcell::stance::Stance;
+use crate::workcell::{Sample, Workcell, reach, redundancies};
 
 /// What every attempt at a plan shares, in the root frame.
 pub(super) struct Shop<'a> {
@@ -121,7 +122,7 @@ impl Shop<'_> {
 
     /// The points to sweep that the plan leaves out.
     pub(super) fn left(&self, plan: &Plan) -> Vec<bool> {
-        let poses = verify::contact_motion(plan, self.cell.arm);
+        let poses = contact_motion(plan, self.cell.arm);
         let swept = coverage::swept(self.scan, &poses, &self.job.tool);
         (0..swept.len()).map(|i| self.to_sweep[i] && !swept[i] && !self.already[i]).collect()
     }

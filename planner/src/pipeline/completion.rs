@@ -8,18 +8,19 @@
 use std::collections::HashSet;
 
 use nullsweep_robot::JointVector;
+use nullsweep_surface::patches::{self, Patch};
 use rayon::prelude::*;
 
 use super::attempt::{Attempt, Shop, Visit};
 use super::{Clock, SWEPT_SHARE};
-use crate::cost::{Cost, CostKind, Effort, TaskTime, displacement};
-use crate::coverage;
-use crate::formulation::{Stop, pose};
-use crate::graph::Edge;
-use crate::layered::{Motion, Moves};
-use crate::motion::{Leg, Mover};
-use crate::patches::{self, Patch};
-use crate::reach::{Sample, redundancies};
+use crate::cost::{Cost, Effort, TaskTime, displacement};
+use crate::motion::layered::{Motion, Moves};
+use crate::motion::mover::{Leg, Mover};
+use crate::plan::CostKind;
+use crate::roadmap::Edge;
+use crate::sweep::coverage;
+use crate::tour::formulation::{Stop, pose};
+use crate::workcell::{Sample, redundancies};
 
 /// Times that patches are put over what is left: a side trip may leave slivers of its own.
 const ROUNDS: usize = 3;

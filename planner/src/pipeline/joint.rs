@@ -1,16 +1,17 @@
 //! The order by the cost of the joint motion, in the tracked model.
 
 use nalgebra::Isometry3;
+use nullsweep_surface::patches::Patch;
 use rayon::prelude::*;
 
 use super::attempt::Shop;
-use crate::cost::{Cost, CostKind, Effort, TaskTime};
-use crate::formulation::{self, FormulationError, JUMP, Stop};
-use crate::graph::Graph;
-use crate::joint::{self, Cluster, JointConfig, Metric, Problem};
-use crate::motion::lift_cost;
-use crate::patches::Patch;
-use crate::reach::redundancies;
+use crate::cost::{Cost, Effort, TaskTime};
+use crate::motion::mover::lift_cost;
+use crate::plan::CostKind;
+use crate::roadmap::Graph;
+use crate::tour::formulation::{self, FormulationError, JUMP, Stop};
+use crate::tour::joint::{self, Cluster, JointConfig, Metric, Problem};
+use crate::workcell::redundancies;
 
 impl Shop<'_> {
     /// The tour by [`formulation::Method::Joint`] over the samples that are free of collision. The

@@ -9,28 +9,27 @@ mod start;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use nalgebra::{Isometry3, Point3};
-use nullsweep_robot::{Arm, ArmError, ArmSpec, JointVector, Robot};
-use serde::{Deserialize, Serialize};
-
-use crate::collision::{self, CollisionError, Obstacle};
-use crate::cost::{self, CostKind, Effort};
-use crate::coverage;
-use crate::formulation::{FormulationConfig, FormulationError, Method};
-use crate::graph::{Graph, GraphConfig};
-use crate::patches::{self, Patch, PatchConfig};
-use crate::plan::{Plan, Stretch};
-use crate::progress::Progress;
-use crate::reach::{Sample, Workcell, reach};
-use crate::scan::Scan;
-use crate::stance::{Stance, StanceSearch};
-use crate::surface::Surface;
-use crate::timing::{Limits, Profile, Rest, accelerate};
-use crate::tool::Tool;
-use crate::verify::{self, Verification};
 use attempt::{Attempt, Shop};
+use nalgebra::{Isometry3, Point3};
+use nullsweep_collision::{self as collision, CollisionError, Obstacle};
+use nullsweep_robot::{Arm, ArmError, ArmSpec, JointVector, Robot, Tool};
+use nullsweep_surface::patches::{self, Patch, PatchConfig};
+use nullsweep_surface::scan::Scan;
+use nullsweep_surface::sheet::Surface;
+use serde::{Deserialize, Serialize};
 use setting::{Setting, settle};
 use start::{Start, start};
+
+use crate::cost::{self, Effort};
+use crate::plan::{CostKind, Method, Plan, Profile, Stretch};
+use crate::progress::Progress;
+use crate::roadmap::{Graph, GraphConfig};
+use crate::sweep::{contact_motion, coverage};
+use crate::timing::{Limits, Rest, accelerate};
+use crate::tour::formulation::{FormulationConfig, FormulationError};
+use crate::verify::{self, Verification};
+use crate::workcell::stance::{Stance, StanceSearch};
+use crate::workcell::{Sample, Workcell, reach};
 
 /// What is to be planned.
 #[derive(Clone, Debug)]
@@ -419,7 +418,7 @@ fn swept_before(
     let mut swept = vec![false; scan.points.len()];
     for Stretch { tool, profile, knots } in plan.followed(knot) {
         let part = Plan { tool, profile, knots, ..plan.clone() };
-        let poses = verify::contact_motion(&part, arm);
+        let poses = contact_motion(&part, arm);
         for (before, now) in swept.iter_mut().zip(coverage::swept(scan, &poses, &part.tool)) {
             *before |= now;
         }

@@ -1,19 +1,19 @@
 //! The robot in its place.
 
 use nalgebra::Point3;
+use nullsweep_collision::{Obstacle, World};
 use nullsweep_robot::{Arm, Robot};
+use nullsweep_surface::patches::Patch;
+use nullsweep_surface::scan::Scan;
+use nullsweep_surface::sheet::Surface;
 use rayon::prelude::*;
 
 use super::start::start;
 use super::{Job, PipelineError, StanceChoice};
-use crate::collision::{Obstacle, World};
-use crate::graph::{self, GraphConfig};
-use crate::patches::Patch;
 use crate::progress::Silent;
-use crate::reach::{Sample, Workcell, reach};
-use crate::scan::Scan;
-use crate::stance::{self, Stance};
-use crate::surface::Surface;
+use crate::roadmap::{GraphConfig, graph};
+use crate::workcell::stance::{self, Stance};
+use crate::workcell::{Sample, Workcell, reach};
 
 /// The robot in its place: everything in its root frame.
 pub(super) struct Setting {

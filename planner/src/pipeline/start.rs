@@ -1,9 +1,9 @@
 //! The posture that a plan starts from.
 
+use nullsweep_collision::{self as collision, CollisionError, ToolContact, World};
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
 
 use super::{Job, PipelineError};
-use crate::collision::{self, CollisionError, ToolContact, World};
 
 /// Where the arm is before the first motion.
 pub(super) struct Start {

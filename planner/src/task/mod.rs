@@ -16,18 +16,18 @@ use nullsweep_robot::{Arm, ArmError, ArmSpec, JointVector, Robot};
 use serde::Serialize;
 use std::time::Instant;
 
-use crate::collision::{self, CollisionError, Obstacle, ToolContact, World};
-use crate::cost::{self, CostKind, Effort};
-use crate::formulation::Method;
-use crate::gtsp::{InstanceError, SolveError};
+use crate::cost::{self, Effort};
+use crate::motion::transfer;
+use crate::plan::{CostKind, Method, Profile};
 use crate::plan::{FORMAT, Held, Plan, PlanKnot, SurfaceSample};
 use crate::progress::Progress;
-use crate::scan::Scan;
-use crate::surface::Surface;
-use crate::timing::{self, Profile};
-use crate::tool::Tool;
-use crate::transfer;
+use crate::timing;
 use crate::verify::{self, Verification};
+use nullsweep_collision::{self as collision, CollisionError, Obstacle, ToolContact, World};
+use nullsweep_gtsp::{InstanceError, SolveError};
+use nullsweep_robot::Tool;
+use nullsweep_surface::scan::Scan;
+use nullsweep_surface::sheet::Surface;
 use route::Route;
 use space::{Point, RESIDUAL, Space, distance};
 

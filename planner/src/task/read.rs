@@ -119,8 +119,9 @@ fn pose(line: &str) -> Result<Isometry3<f64>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use std::io::Write as _;
+
+    use super::*;
 
     fn read_text(text: &str) -> Result<Vec<Isometry3<f64>>, PosesError> {
         let mut file = tempfile::NamedTempFile::new().unwrap();

@@ -11,6 +11,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Vector3};
+use nullsweep_gtsp::{self as gtsp, Block, Budget, Costs, Ends, Instance, Jump};
 use nullsweep_robot::JointVector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,7 +20,6 @@ use rayon::prelude::*;
 use super::route::{PENALTY, Route, Task};
 use super::space::{Point, Space, distance};
 use super::{TaskConfig, TaskError};
-use crate::gtsp::{self, Block, Budget, Costs, Ends, Instance, Jump};
 use crate::progress::Progress;
 
 /// Poses from which charts grow.

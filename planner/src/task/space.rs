@@ -1,11 +1,10 @@
 //! The joint vectors that meet a pose within its tolerance.
 
 use nalgebra::{Cholesky, Isometry3, Matrix6, Vector3, Vector6};
-use nullsweep_robot::{Arm, Jacobian, JointVector, MAX_DOF};
+use nullsweep_collision::{ToolContact, World};
+use nullsweep_robot::{Arm, Jacobian, JointVector, MAX_DOF, Tool};
 
 use super::Tolerance;
-use crate::collision::{ToolContact, World};
-use crate::tool::Tool;
 
 /// The arm, its tool and its tolerances.
 #[derive(Clone, Copy)]
@@ -193,15 +192,16 @@ fn deviation(pose: &Isometry3<f64>, tool: &Isometry3<f64>) -> [f64; 6] {
         false => (1.0, tilt),
     };
     let turn = 2.0 * off.rotation.k.atan2(off.rotation.w);
-    let turn = crate::track::wrap(turn);
+    let turn = nullsweep_robot::wrap(turn);
     let t = off.translation.vector;
     [t.x, t.y, t.z, x * share, axis.x * share, turn]
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nalgebra::UnitQuaternion;
+
+    use super::*;
 
     #[test]
     fn deviations_are_seen_from_the_pose() {

@@ -1,15 +1,15 @@
 //! A plan with bang-bang velocity becomes one with limited acceleration.
 
 use nalgebra::Point3;
+use nullsweep_collision::ToolContact;
 use nullsweep_robot::JointVector;
 
+use super::Limits;
 use super::run::{Piece, Run};
 use super::sampled::{Timed, braked, timed};
 use super::smooth::{cut, smooth};
-use super::{Limits, Profile};
-use crate::collision::ToolContact;
-use crate::plan::{Plan, PlanKnot};
-use crate::reach::Workcell;
+use crate::plan::{Plan, PlanKnot, Profile};
+use crate::workcell::Workcell;
 
 /// Farthest that the pad's centre may leave the planned line where a corner is blended: what
 /// straight joint lines between knots leave it by anyway. \[m\]

@@ -14,21 +14,8 @@ pub use sampled::{Timed, timed};
 pub use smooth::smooth;
 
 use nullsweep_robot::{Arm, JointVector};
-use serde::{Deserialize, Serialize};
 
 use crate::cost;
-
-/// How fast a plan goes along its path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Profile {
-    /// Every straight segment as fast as its slowest joint allows: bang-bang velocity, as in the
-    /// paper. Joints change their speed at once, so a real arm lags.
-    #[default]
-    Velocity,
-    /// As fast as velocity and acceleration allow, corners blended.
-    Acceleration,
-}
 
 /// What the joints may do. 0 in unused lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]

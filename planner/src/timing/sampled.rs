@@ -5,7 +5,7 @@ use nullsweep_robot::{JointVector, MAX_DOF};
 use super::Limits;
 use super::optimal::{Interval, squared_speeds};
 use super::run::{Piece, Run};
-use crate::curve::Curve;
+use crate::plan::Curve;
 
 /// A moment of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,9 +12,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::{Parser, ValueEnum};
+use nullsweep_cli::ProfileArg;
 use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
 use nullsweep_planner::plan::Plan;
-use nullsweep_planner::timing::Profile;
+use nullsweep_planner::plan::Profile;
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Fidelity;
@@ -56,7 +57,7 @@ struct Args {
     hardware: Hardware,
     /// How fast the plans go along their paths
     #[arg(long, value_enum, default_value = "acceleration")]
-    profile: Profile,
+    profile: ProfileArg,
     /// With --hardware mujoco: the Python that has its packages
     #[arg(long, default_value = "python3", value_name = "PROGRAM")]
     python: String,
@@ -283,7 +284,7 @@ fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     let join = found.verdict.as_ref().and_then(|v| v.run(&new.to_string()));
     let mut outcome = Outcome {
         hardware: args.hardware,
-        profile: args.profile,
+        profile: args.profile.into(),
         plans: [first, second],
         swap: Swap {
             knot,

@@ -1,7 +1,8 @@
 //! The judge on hand-made streams.
 
-use super::*;
 use nullsweep_robot::{ArmSpec, Robot, Side};
+
+use super::*;
 
 fn arm() -> Arm {
     Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("the embedded PR2 has a right arm")

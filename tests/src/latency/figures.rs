@@ -1,9 +1,8 @@
 //! What a run of the lab found, and how it is told.
 
 use std::fs::{self, File};
-use std::io;
 use std::path::Path;
-use std::thread;
+use std::{io, thread};
 
 use anyhow::Context;
 use comfy_table::{CellAlignment, Table, presets};

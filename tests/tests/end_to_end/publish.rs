@@ -4,12 +4,10 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use nullsweep_ipc_types::EventKind;
-use nullsweep_planner::cost::CostKind;
-use nullsweep_planner::formulation::Method;
-use nullsweep_planner::plan::{Continues, FORMAT, Held, Plan, PlanKnot, SurfaceSample};
-use nullsweep_planner::timing::Profile;
-use nullsweep_planner::tool::Tool;
-use nullsweep_robot::{Arm, JointVector};
+use nullsweep_planner::plan::{
+    Continues, CostKind, FORMAT, Held, Method, Plan, PlanKnot, Profile, SurfaceSample,
+};
+use nullsweep_robot::{Arm, JointVector, Tool};
 use nullsweep_tests::sketch::{Sketch, swung};
 use nullsweep_tests::stage::{Part, Process, Stage};
 use nullsweep_tests::system::System;

@@ -1,0 +1,53 @@
+//! Progress bars.
+
+use std::sync::Mutex;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use nullsweep_planner::progress::Progress;
+
+/// Shows each stage's progress on standard error, if that is a terminal.
+pub(super) struct Bars {
+    bar: Mutex<ProgressBar>,
+}
+
+impl Bars {
+    pub(super) fn new() -> Self {
+        Self { bar: Mutex::new(ProgressBar::hidden()) }
+    }
+
+    pub(super) fn clear(&self) {
+        self.with(ProgressBar::finish_and_clear);
+    }
+
+    fn with(&self, act: impl FnOnce(&ProgressBar)) {
+        if let Ok(bar) = self.bar.lock() {
+            act(&bar);
+        }
+    }
+}
+
+impl Progress for Bars {
+    fn stage(&self, name: &'static str, total: Option<usize>) {
+        let (bar, template) = match total {
+            Some(n) => (ProgressBar::new(n as u64), "{msg:<28} {wide_bar} {pos}/{len} {elapsed}"),
+            None => (ProgressBar::new_spinner(), "{msg:<28} {spinner} {elapsed}"),
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(name);
+        bar.enable_steady_tick(std::time::Duration::from_millis(100));
+        if let Ok(mut shown) = self.bar.lock() {
+            shown.finish_and_clear();
+            *shown = bar;
+        }
+    }
+
+    fn tick(&self) {
+        self.with(|bar| bar.inc(1));
+    }
+
+    fn note(&self, text: &str) {
+        self.with(|bar| bar.suspend(|| eprintln!("note: {text}")));
+    }
+}

@@ -1,0 +1,90 @@
+//! What the planner's choices are called on the command line.
+
+use clap::ValueEnum;
+use nullsweep_experiment::Object;
+use nullsweep_planner::link::publish::Join;
+use nullsweep_planner::plan::export::Format;
+use nullsweep_planner::plan::{CostKind, Method, Profile};
+
+/// An argument's values, and the library's choices that they stand for.
+macro_rules! choices {
+    ($(#[$about:meta])* $name:ident for $of:ident { $($(#[$help:meta])* $value:ident,)* }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+        pub enum $name { $($(#[$help])* $value,)* }
+
+        impl From<$name> for $of {
+            fn from(choice: $name) -> Self {
+                match choice { $($name::$value => Self::$value,)* }
+            }
+        }
+    };
+}
+
+choices! {
+    /// How the order is found.
+    MethodArg for Method {
+        /// Shortest Euclidean way; the headings follow from it.
+        Tsp,
+        /// A node for each patch and incident edge; distance and turning are weighed (Eq. 4).
+        Curvature,
+        /// A node for each patch, incident edge and sample of the inverse kinematics; the cost of
+        /// the joint motion is weighed (Eq. 1-3).
+        Joint,
+    }
+}
+
+choices! {
+    /// What is minimised.
+    CostArg for CostKind {
+        /// The sum of all joint displacements (Eq. 1).
+        Effort,
+        /// The time that the slowest joint takes (Eq. 2).
+        Time,
+    }
+}
+
+choices! {
+    /// How fast a plan goes along its path.
+    ProfileArg for Profile {
+        /// Every straight segment as fast as its slowest joint allows: bang-bang velocity, as in
+        /// the paper. Joints change their speed at once, so a real arm lags.
+        Velocity,
+        /// As fast as velocity and acceleration allow, corners blended.
+        Acceleration,
+    }
+}
+
+choices! {
+    /// How a plan joins what is going on.
+    JoinArg for Join {
+        /// Stop on the running plan's path, then start.
+        Stop,
+        /// Start after the running plan.
+        After,
+        /// Start in the knot that the plan was made for.
+        Knot,
+    }
+}
+
+choices! {
+    /// How a trajectory is written.
+    FormatArg for Format {
+        /// As `rostopic pub -f` reads it.
+        RosYaml,
+        /// A line a knot: time, positions, velocities, patch, whether the pad is on the surface.
+        Csv,
+        /// The message's fields by their names.
+        Json,
+    }
+}
+
+choices! {
+    /// The paper's objects.
+    ObjectArg for Object {
+        /// Table I.
+        Chair,
+        /// Table II.
+        BobbyCar,
+    }
+}

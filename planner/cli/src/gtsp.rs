@@ -1,0 +1,193 @@
+//! `planner gtsp`: solves a GTSPLIB file and says how well.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use nullsweep_gtsp::tsplib::{TsplibError, read_gtsp, write_tour};
+use nullsweep_gtsp::{
+    Budget, Instance, SolveError, Tour, TourCost, lower_bound, solve, solve_transformed,
+};
+use serde::Serialize;
+
+/// Solve a generalized travelling-salesman instance (GTSPLIB or TSPLIB file).
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct GtspArgs {
+    /// Instance file.
+    file: PathBuf,
+    /// Wall-clock limit in seconds; 10 where neither it nor --trials is given.
+    #[arg(long)]
+    seconds: Option<f64>,
+    /// Limit in trials: the result then depends on the file, the seed and this number alone.
+    #[arg(long)]
+    trials: Option<u64>,
+    /// Seed of the search.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Threads; 0: one for every core.
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Write the tour (node numbers of the file) to this TSPLIB tour file.
+    #[arg(long)]
+    tour: Option<PathBuf>,
+    /// Write the result as JSON to this file, `-` for standard output.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Best known value: prints the gap to it.
+    #[arg(long)]
+    best: Option<f64>,
+    /// How to solve it.
+    #[arg(long, value_enum, default_value_t = Method::Search)]
+    method: Method,
+}
+
+/// Ways to solve an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Method {
+    /// The search of this crate.
+    Search,
+    /// Behzad and Modarres' transformation and a Lin–Kernighan-style search of the ATSP.
+    Transformed,
+}
+
+/// Why the subcommand failed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum GtspCliError {
+    /// The instance cannot be read.
+    #[error("cannot use {file}")]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        source: TsplibError,
+    },
+    /// A limit that makes no sense.
+    #[error("--seconds {0}: give a positive number of seconds")]
+    Seconds(f64),
+    /// The search did not start.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// An output cannot be written.
+    #[error("cannot write {file}")]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// The system's words.
+        source: io::Error,
+    },
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    name: &'a str,
+    clusters: usize,
+    nodes: usize,
+    value: f64,
+    jumps: usize,
+    seconds: f64,
+    trials: u64,
+    seed: u64,
+    lower_bound: Option<f64>,
+    /// Excess over the best known value [%].
+    gap_percent: Option<f64>,
+    tour: Vec<usize>,
+}
+
+/// Runs the subcommand; the summary goes to `out`.
+pub(super) fn run(args: &GtspArgs, out: &mut dyn Write) -> Result<(), GtspCliError> {
+    let file = read_gtsp(&args.file)
+        .map_err(|source| GtspCliError::File { file: args.file.clone(), source })?;
+    let started = Instant::now();
+    let (tour, cost, trials, bound) = match args.method {
+        Method::Search => {
+            let solution = solve(&file.instance, &budget(args)?, args.seed)?;
+            (solution.tour, solution.cost, solution.trials, solution.lower_bound)
+        }
+        Method::Transformed => transformed(&file.instance, &budget(args)?, args.seed),
+    };
+    let value = cost.total();
+    let numbers = file.tour_numbers(&tour);
+    let report = Report {
+        name: &file.name,
+        clusters: file.instance.clusters(),
+        nodes: file.instance.nodes(),
+        value,
+        jumps: cost.jumps,
+        seconds: started.elapsed().as_secs_f64(),
+        trials,
+        seed: args.seed,
+        lower_bound: bound.or_else(|| lower_bound(&file.instance)),
+        gap_percent: args
+            .best
+            .map(|best| 100.0 * (value - best) / best.abs().max(f64::MIN_POSITIVE)),
+        tour: numbers,
+    };
+    let written = |path: &PathBuf, result: io::Result<()>| {
+        result.map_err(|source| GtspCliError::Write { file: path.clone(), source })
+    };
+    if let Some(path) = &args.tour {
+        let save = || {
+            let mut to = io::BufWriter::new(std::fs::File::create(path)?);
+            write_tour(&file.name, &report.tour, value, &mut to)?;
+            to.flush()
+        };
+        written(path, save())?;
+    }
+    let to_stdout = args.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
+    if let Some(path) = &args.json {
+        let text = serde_json::to_string(&report).expect("plain numbers and strings");
+        let result =
+            if to_stdout { writeln!(out, "{text}") } else { std::fs::write(path, text + "\n") };
+        written(path, result)?;
+    }
+    if !to_stdout {
+        written(&PathBuf::from("standard output"), summary(&report, out))?;
+    }
+    Ok(())
+}
+
+fn summary(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
+    write!(
+        out,
+        "{}: value {} in {:.2} s, {} trials, {} clusters, {} nodes",
+        report.name, report.value, report.seconds, report.trials, report.clusters, report.nodes
+    )?;
+    if report.jumps > 0 {
+        write!(out, ", {} jumps", report.jumps)?;
+    }
+    if let Some(bound) = report.lower_bound {
+        write!(out, ", lower bound {bound:.1}")?;
+    }
+    if let Some(gap) = report.gap_percent {
+        write!(out, ", gap {gap:.4} %")?;
+    }
+    writeln!(out)
+}
+
+fn budget(args: &GtspArgs) -> Result<Budget, GtspCliError> {
+    let time = match (args.seconds, args.trials) {
+        (None, Some(_)) => None,
+        (seconds, _) => {
+            let seconds = seconds.unwrap_or(10.0);
+            let time = Duration::try_from_secs_f64(seconds).ok().filter(|t| !t.is_zero());
+            Some(time.ok_or(GtspCliError::Seconds(seconds))?)
+        }
+    };
+    Ok(Budget { trials: args.trials, time, threads: args.threads, target: args.best })
+}
+
+fn transformed(
+    instance: &Instance,
+    budget: &Budget,
+    seed: u64,
+) -> (Tour, TourCost, u64, Option<f64>) {
+    let started = Instant::now();
+    let made = std::cell::Cell::new(0);
+    let stop = || {
+        let end = budget.time.is_some_and(|t| started.elapsed() >= t);
+        made.set(made.get() + u64::from(!end));
+        end
+    };
+    let (tour, cost) = solve_transformed(instance, budget.trials.unwrap_or(u64::MAX), seed, &stop);
+    (tour, cost, made.get(), None)
+}

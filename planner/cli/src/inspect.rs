@@ -1,0 +1,120 @@
+//! `planner inspect`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nullsweep_planner::cost::{Effort, of_path};
+use nullsweep_planner::plan::Plan;
+use serde::Serialize;
+
+use crate::{OK, write_json};
+
+#[derive(Debug, Args)]
+pub(super) struct InspectArgs {
+    /// The plan file.
+    plan: PathBuf,
+    /// Write the figures as JSON to a file, or `-`, instead of a table.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// What a plan file holds.
+#[derive(Debug, Serialize)]
+struct Summary {
+    robot: String,
+    fingerprint: String,
+    base: [f64; 3],
+    method: String,
+    cost: String,
+    seed: u64,
+    knots: usize,
+    knots_on_surface: usize,
+    patches_visited: usize,
+    duration_s: f64,
+    effort_rad: f64,
+    continues_at_knot: Option<u32>,
+    joints: Vec<JointSummary>,
+    held: Vec<(String, f64)>,
+}
+
+#[derive(Debug, Serialize)]
+struct JointSummary {
+    name: String,
+    min: f64,
+    max: f64,
+    displacement: f64,
+}
+
+pub(super) fn run(args: &InspectArgs) -> anyhow::Result<u8> {
+    let plan = Plan::read(&args.plan)?;
+    let summary = summarise(&plan);
+    match &args.json {
+        Some(path) => write_json(&summary, path)?,
+        None => print!("{}", tables(&summary)),
+    }
+    Ok(OK)
+}
+
+fn summarise(plan: &Plan) -> Summary {
+    let path: Vec<_> = plan.knots.iter().map(|k| k.q).collect();
+    let joints = plan.joints.iter().enumerate().map(|(j, name)| {
+        let values = path.iter().map(|q| q[j]);
+        JointSummary {
+            name: name.clone(),
+            min: values.clone().fold(f64::INFINITY, f64::min),
+            max: values.fold(f64::NEG_INFINITY, f64::max),
+            displacement: path.windows(2).map(|w| (w[1][j] - w[0][j]).abs()).sum(),
+        }
+    });
+    Summary {
+        robot: plan.robot.clone(),
+        fingerprint: format!("{:016x}", plan.fingerprint),
+        base: plan.base,
+        method: format!("{:?}", plan.method),
+        cost: format!("{:?}", plan.cost),
+        seed: plan.seed,
+        knots: plan.knots.len(),
+        knots_on_surface: plan.knots.iter().filter(|k| k.line.is_some()).count(),
+        patches_visited: plan.knots.iter().filter(|k| k.patch.is_some()).count(),
+        duration_s: plan.duration(),
+        effort_rad: of_path(&Effort, &path),
+        continues_at_knot: plan.continues.as_ref().map(|c| c.knot),
+        joints: joints.collect(),
+        held: plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
+    }
+}
+
+fn tables(s: &Summary) -> String {
+    let mut plan = Table::new();
+    plan.load_style(UTF8_FULL_CONDENSED).set_header(["plan", ""]);
+    plan.add_row(["robot", &format!("{} ({})", s.robot, s.fingerprint)]);
+    plan.add_row([
+        "base x, y, yaw",
+        &format!("{:.3} {:.3} {:.3}", s.base[0], s.base[1], s.base[2]),
+    ]);
+    plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
+    plan.add_row(["knots (on the surface)", &format!("{} ({})", s.knots, s.knots_on_surface)]);
+    plan.add_row(["patches visited", &s.patches_visited.to_string()]);
+    plan.add_row(["duration", &format!("{:.2} s", s.duration_s)]);
+    plan.add_row(["effort", &format!("{:.2} rad", s.effort_rad)]);
+    if let Some(knot) = s.continues_at_knot {
+        plan.add_row(["continues another plan at knot", &knot.to_string()]);
+    }
+    let mut joints = Table::new();
+    joints.load_style(UTF8_FULL_CONDENSED).set_header(["joint", "min", "max", "displacement"]);
+    for j in &s.joints {
+        joints.add_row([
+            j.name.clone(),
+            format!("{:.3}", j.min),
+            format!("{:.3}", j.max),
+            format!("{:.2}", j.displacement),
+        ]);
+    }
+    for (name, position) in &s.held {
+        let held = format!("{position:.4}");
+        joints.add_row([name.clone(), held.clone(), held, "held".into()]);
+    }
+    format!("{plan}\n{joints}\n")
+}

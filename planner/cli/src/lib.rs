@@ -1,0 +1,105 @@
+//! The command line of `planner`.
+
+mod bars;
+mod choices;
+mod experiment;
+mod export;
+mod gtsp;
+mod inspect;
+mod picture;
+mod plan;
+mod publish;
+mod replan;
+mod robot;
+mod scene;
+mod task;
+
+pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
+pub use picture::{joint_axes, motion};
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Everything went well.
+pub const OK: u8 = 0;
+/// Bad input, no plan, no executor, a rejection.
+pub const FAILED: u8 = 1;
+/// The command line was wrong (clap's own code).
+pub const USAGE: u8 = 2;
+/// A plan was made but breaks a rule, so it was not written.
+pub const VIOLATIONS: u8 = 3;
+
+/// Plans how a redundant arm sweeps a scanned surface, and publishes the plan.
+#[derive(Debug, Parser)]
+#[command(
+    name = "planner",
+    version,
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule and was not written."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make a plan from scans, or from a simulated scan.
+    Plan(Box<plan::PlanArgs>),
+    /// Make a plan through given tool poses.
+    Task(Box<task::TaskArgs>),
+    /// Send a plan to the executor.
+    Publish(publish::PublishArgs),
+    /// Replace the plan that runs by one for what it has not swept yet, without a stop.
+    Replan(Box<replan::ReplanArgs>),
+    /// Solve a generalized travelling-salesman file.
+    Gtsp(gtsp::GtspArgs),
+    /// Write a plan as a trajectory for other programs.
+    Export(export::ExportArgs),
+    /// The paper's tables I and II, our figures beside the published ones.
+    Experiment(Box<experiment::ExperimentArgs>),
+    /// Say what a plan file holds.
+    Inspect(inspect::InspectArgs),
+}
+
+/// Runs the command line and returns the process's exit code.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(e) => {
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { USAGE } else { OK });
+        }
+    };
+    let result = match cli.command {
+        Command::Plan(args) => plan::run(&args),
+        Command::Task(args) => task::run(&args),
+        Command::Publish(args) => publish::run(&args),
+        Command::Replan(args) => replan::run(&args),
+        Command::Gtsp(args) => gtsp::run(&args, &mut std::io::stdout().lock())
+            .map(|()| OK)
+            .map_err(anyhow::Error::from),
+        Command::Export(args) => export::run(&args),
+        Command::Experiment(args) => experiment::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+    };
+    match result {
+        Ok(code) => ExitCode::from(code),
+        Err(e) => {
+            eprintln!("planner: {e:#}");
+            ExitCode::from(FAILED)
+        }
+    }
+}
+
+/// Writes pretty JSON to a file, or to standard output for `-`.
+fn write_json<T: serde::Serialize>(value: &T, to: &std::path::Path) -> anyhow::Result<()> {
+    use anyhow::Context;
+    let text = serde_json::to_string_pretty(value)?;
+    if to == std::path::Path::new("-") {
+        println!("{text}");
+        return Ok(());
+    }
+    std::fs::write(to, text + "\n").with_context(|| format!("cannot write {}", to.display()))
+}

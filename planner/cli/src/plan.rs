@@ -1,0 +1,330 @@
+//! `planner plan`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context, ensure};
+use clap::Args;
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nullsweep_planner::pipeline::{self, After, Figures, Job, Outcome, StanceChoice};
+use nullsweep_planner::plan::Plan;
+use nullsweep_planner::progress::Progress;
+use nullsweep_planner::roadmap::GraphConfig;
+use nullsweep_planner::tour::formulation::FormulationConfig;
+use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
+use nullsweep_report as report;
+use nullsweep_robot::{JointVector, MAX_DOF, Robot, Tool};
+use nullsweep_surface::patches::PatchConfig;
+
+use crate::bars::Bars;
+use crate::choices::{CostArg, MethodArg, ProfileArg};
+use crate::picture::picture;
+use crate::robot::RobotArgs;
+use crate::scene::{Demo, Numbers, Scene, SceneArgs, scene};
+use crate::{OK, VIOLATIONS, write_json};
+
+#[derive(Debug, Args)]
+pub(super) struct PlanArgs {
+    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ.
+    #[arg(required_unless_present = "demo", conflicts_with = "demo")]
+    scans: Vec<PathBuf>,
+    /// Plan for a simulated scan instead.
+    #[arg(long, value_enum)]
+    demo: Option<Demo>,
+
+    #[command(flatten)]
+    scene: SceneArgs,
+
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// The tool, a TOML file; without it a sponge of 0.10 × 0.07 m.
+    #[arg(long, value_name = "FILE")]
+    tool: Option<PathBuf>,
+    /// Where the robot stands in the floor frame: x,y,yaw, or `auto`: where it reaches most.
+    #[arg(long, default_value = "auto", allow_hyphen_values = true)]
+    base: Base,
+    /// Height of the PR2's torso joint, with a given base. [m]
+    #[arg(long, value_name = "M")]
+    torso: Option<f64>,
+    /// Position of another held joint: NAME=VALUE.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    held: Vec<HeldArg>,
+    /// Where the arm starts: its joints, comma-separated; without it a posture that the SRDF names
+    /// (home before others), or the middle of its ranges, or the nearest free of collision.
+    #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true, value_delimiter = ',')]
+    start: Vec<f64>,
+
+    /// Go on from knot K of a plan, for the patches that it has not swept by then.
+    #[arg(long = "continue", value_name = "PLAN@K")]
+    after: Option<KnotOf>,
+    /// With --continue: sweep everything again.
+    #[arg(long, requires = "after")]
+    again: bool,
+
+    /// How the order is found.
+    #[arg(long, value_enum, default_value = "curvature")]
+    method: MethodArg,
+    /// What is minimised.
+    #[arg(long, value_enum, default_value = "time")]
+    cost: CostArg,
+    /// Samples of the inverse kinematics at each tool pose.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    ik_samples: u32,
+    /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
+    #[arg(long)]
+    v_max: Option<f64>,
+    /// How fast the plan goes along its path: at bang-bang velocity, or as fast as velocity and
+    /// acceleration allow, corners blended within the line's tolerance.
+    #[arg(long, value_enum, default_value = "velocity")]
+    profile: ProfileArg,
+    /// Radius of a patch's neighbourhood. [m]
+    #[arg(long, default_value_t = PatchConfig::default().epsilon)]
+    patch_radius: f64,
+    /// Nearest neighbours of each patch that are tried as edges.
+    #[arg(long, default_value_t = GraphConfig::default().neighbours)]
+    neighbours: usize,
+    /// Longest edge. [m]
+    #[arg(long, default_value_t = GraphConfig::default().radius)]
+    radius: f64,
+    /// Weight of turning against distance in the Curvature-GTSP (Eq. 4).
+    #[arg(long, default_value_t = FormulationConfig::default().beta)]
+    beta: f64,
+    /// Trials of the order's search for each patch.
+    #[arg(long, default_value_t = FormulationConfig::default().trials_per_cluster)]
+    trials: u64,
+    /// How often patches are put over what the plan has not swept, and the plan is made again.
+    #[arg(long, default_value_t = 2)]
+    refinements: usize,
+    /// Seed of every random choice: the same seed gives the same plan.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+
+    /// Where the plan is written.
+    #[arg(long, short, value_name = "FILE", default_value = "plan.json")]
+    out: PathBuf,
+    /// Write every figure of the run as JSON to a file, or `-`.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a page with pictures of scan, graph, tool path and joints.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Base {
+    Auto,
+    At([f64; 3]),
+}
+
+impl FromStr for Base {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" { Ok(Self::Auto) } else { Ok(Self::At(Numbers::from_str(text)?.0)) }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct HeldArg(String, f64);
+
+impl FromStr for HeldArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, value) = text.split_once('=').ok_or("NAME=VALUE is wanted")?;
+        Ok(Self(name.into(), value.parse().map_err(|e| format!("`{value}`: {e}"))?))
+    }
+}
+
+#[derive(Clone, Debug)]
+struct KnotOf {
+    plan: PathBuf,
+    knot: usize,
+}
+
+impl FromStr for KnotOf {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (plan, knot) = text.rsplit_once('@').ok_or("PLAN@K is wanted")?;
+        let knot = knot.parse().map_err(|e| format!("`{knot}`: {e}"))?;
+        Ok(Self { plan: plan.into(), knot })
+    }
+}
+
+pub(super) fn run(args: &PlanArgs) -> anyhow::Result<u8> {
+    let after = match &args.after {
+        None => None,
+        Some(KnotOf { plan, knot }) => {
+            let plan = Plan::read(plan)?;
+            Some(After { plan, knot: *knot, held: None, again: args.again })
+        }
+    };
+    Ok(make(args, after)?.0)
+}
+
+/// Makes a plan, writes what was asked for, and gives the exit code with it.
+pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8, Plan)> {
+    let bars = Bars::new();
+    let robot = args.robot.robot()?;
+    bars.stage("scan", None);
+    let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
+    let job = job(args, &robot, &scene, after)?;
+    let outcome = pipeline::run(&robot, &scene.surface, &job, &bars);
+    bars.clear();
+    let outcome = outcome?;
+    Ok((finish(args, &outcome)?, outcome.plan))
+}
+
+impl PlanArgs {
+    /// Whether they say where the plan begins or where the robot stands.
+    pub(super) fn is_placed(&self) -> bool {
+        let stands = !matches!(self.base, Base::Auto) || self.torso.is_some();
+        self.after.is_some() || !self.start.is_empty() || !self.held.is_empty() || stands
+    }
+}
+
+/// Writes what was asked for and prints the table.
+fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
+    let figures = &outcome.figures;
+    if let Some(path) = &args.json {
+        write_json(figures, path)?;
+    }
+    if let Some(path) = &args.report {
+        report::write(path, &picture(outcome, figures_table(figures)))?;
+    }
+    let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
+    if !to_stdout {
+        println!("{}", table(figures));
+    }
+    let violations = &figures.verification.violations;
+    if violations.is_empty() {
+        outcome.plan.write(&args.out)?;
+        if !to_stdout {
+            println!("plan: {}", args.out.display());
+            if let Some(path) = &args.report {
+                println!("report: {}", path.display());
+            }
+        }
+        return Ok(OK);
+    }
+    for v in violations.iter().take(10) {
+        eprintln!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail);
+    }
+    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
+    Ok(VIOLATIONS)
+}
+
+/// The figures as name and value, for people.
+fn rows(f: &Figures) -> Vec<[String; 2]> {
+    let v = &f.verification;
+    let mut rows = Vec::new();
+    let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
+    row("points", f.points.to_string());
+    row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
+    row("fill-in patches", f.fill_in_patches.to_string());
+    row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
+    row("base x, y, yaw", format!("{:.3}, {:.3}, {:.3}", f.base[0], f.base[1], f.base[2]));
+    for (name, position) in &f.held {
+        row(name, format!("{position:.3}"));
+    }
+    row("effort", format!("{:.2} rad", f.effort_rad));
+    row("task time", format!("{:.2} s", f.task_time_s));
+    row("distance on the surface", format!("{:.2} m", f.distance_m));
+    row("distance in transfers", format!("{:.2} m", f.transfer_m));
+    row("jumps", f.jumps.to_string());
+    row("dropped patches", f.dropped_patches.to_string());
+    row("knots", f.knots.to_string());
+    row("coverage of reachable points", format!("{:.4}", v.coverage_reachable));
+    row("coverage of all points", format!("{:.4}", v.coverage_all));
+    row("line deviation, max", format!("{:.3} mm", v.line_deviation_max_m * 1e3));
+    let distance = (v.scan_distance_p95_m * 1e3, v.scan_distance_max_m * 1e3);
+    row("distance to the scan, p95, max", format!("{:.2}, {:.2} mm", distance.0, distance.1));
+    row("violations", v.violations.len().to_string());
+    row("calculation", format!("{:.2} s", f.calc_time_total_s));
+    for (stage, seconds) in &f.calc_time_s {
+        row(&format!("  {stage}"), format!("{seconds:.2} s"));
+    }
+    rows
+}
+
+fn table(figures: &Figures) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+    table.add_rows(rows(figures));
+    table
+}
+
+fn figures_table(figures: &Figures) -> report::Table {
+    report::Table {
+        title: "Figures".into(),
+        columns: vec!["figure".into(), "value".into()],
+        rows: rows(figures).into_iter().map(Vec::from).collect(),
+    }
+}
+
+fn job(args: &PlanArgs, robot: &Robot, scene: &Scene, after: Option<After>) -> anyhow::Result<Job> {
+    let tool = match &args.tool {
+        None => Tool::default(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("cannot read {}", path.display()))?;
+            toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))?
+        }
+    };
+    let stance = match (&after, args.base) {
+        (Some(after), _) => StanceChoice::Given(Stance {
+            base: after.plan.base,
+            held: after.plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
+        }),
+        (None, Base::At(base)) => StanceChoice::Given(Stance { base, held: held(args) }),
+        (None, Base::Auto) => {
+            let arm = robot.arm(&args.robot.spec()?)?;
+            let mut search =
+                StanceSearch { held: held(args), ..StanceSearch::of(robot, &arm, &tool) };
+            if args.torso.is_some() {
+                search.lift = None;
+            }
+            StanceChoice::Search(search)
+        }
+    };
+    ensure!(args.start.len() <= MAX_DOF, "--start has more than {MAX_DOF} joints");
+    let mut start: JointVector = [0.0; MAX_DOF];
+    start[..args.start.len()].copy_from_slice(&args.start);
+    let line_wave = tool.width;
+    Ok(Job {
+        arm: args.robot.spec()?,
+        tool,
+        stance,
+        surroundings: scene.surroundings.clone(),
+        obstacles: scene.obstacles.clone(),
+        start: (!args.start.is_empty()).then_some(start),
+        after,
+        method: args.method.into(),
+        cost: args.cost.into(),
+        ik_samples: args.ik_samples as usize,
+        v_max: args.v_max,
+        profile: args.profile.into(),
+        patches: PatchConfig { epsilon: args.patch_radius, ..PatchConfig::default() },
+        graph: GraphConfig {
+            neighbours: args.neighbours,
+            radius: args.radius,
+            line_wave,
+            ..GraphConfig::default()
+        },
+        formulation: FormulationConfig {
+            beta: args.beta,
+            trials_per_cluster: args.trials,
+            ..FormulationConfig::default()
+        },
+        refinements: args.refinements,
+        collision: args.robot.collision(),
+        seed: args.seed,
+    })
+}
+
+fn held(args: &PlanArgs) -> Vec<(String, f64)> {
+    let torso = args.torso.map(|height| ("torso_lift_joint".to_owned(), height));
+    torso.into_iter().chain(args.held.iter().map(|h| (h.0.clone(), h.1))).collect()
+}

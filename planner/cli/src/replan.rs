@@ -1,0 +1,81 @@
+//! `planner replan`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::ensure;
+use clap::Args;
+use nullsweep_ipc_types::service::DEFAULT_ROBOT;
+use nullsweep_planner::link::publish::{Patience, describe};
+use nullsweep_planner::link::replan::{Site, Start, replan};
+use nullsweep_planner::pipeline::After;
+use nullsweep_planner::plan::Plan;
+
+use crate::plan::{PlanArgs, make};
+use crate::{OK, VIOLATIONS};
+
+#[derive(Debug, Args)]
+pub(super) struct ReplanArgs {
+    /// The plan file that is being executed.
+    #[arg(long, value_name = "PLAN")]
+    running: PathBuf,
+    /// How long planning may take: the new plan begins in the first knot that is further ahead.
+    /// Where planning takes longer, the arm is stopped on its path and planned for from there. [s]
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    lead: f64,
+    /// The robot's name in the service names.
+    #[arg(long, default_value = DEFAULT_ROBOT)]
+    robot_name: String,
+    /// iceoryx2's root path, if not the default.
+    #[arg(long)]
+    ipc_root: Option<PathBuf>,
+    /// Wait for the new plan's end as well.
+    #[arg(long)]
+    wait: bool,
+    /// Seconds to wait for the executor's admission.
+    #[arg(long, default_value_t = 5.0)]
+    timeout: f64,
+    #[command(flatten)]
+    plan: PlanArgs,
+}
+
+pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
+    ensure!(
+        !args.plan.is_placed(),
+        "where the new plan begins and the robot stands is the running plan's: leave out \
+         --continue, --start, --base, --torso and --held"
+    );
+    let lead = Duration::try_from_secs_f64(args.lead)?;
+    let running = Plan::read(&args.running)?;
+    let end = args.wait.then(|| Duration::from_secs_f64(10.0 * running.duration() + 600.0));
+    let patience = Patience { admission: Duration::from_secs_f64(args.timeout), end };
+    let site = Site { robot: &args.robot_name, root: args.ipc_root.as_deref() };
+    let mut code = OK;
+    let mut from = |start: Start| {
+        let (knot, held) = match start {
+            Start::Knot(knot) => {
+                println!("planning from knot {knot} on, at most {} s", args.lead);
+                (knot, None)
+            }
+            Start::Held { knot, at } => {
+                println!(
+                    "the knot has passed: the arm holds past knot {knot}, planning from there"
+                );
+                (knot, Some(at))
+            }
+        };
+        let after = After { plan: running.clone(), knot, held, again: false };
+        let (made, plan) = make(&args.plan, Some(after)).map_err(|e| format!("{e:#}"))?;
+        code = made;
+        if code == VIOLATIONS { Err("it breaks a rule".to_owned()) } else { Ok(plan) }
+    };
+    let done = replan(site, &running, lead, patience, &mut from, &mut |event| {
+        println!("{}", describe(event));
+    });
+    match done {
+        Ok(done) => println!("{done}"),
+        Err(_) if code == VIOLATIONS => {}
+        Err(error) => return Err(error.into()),
+    }
+    Ok(code)
+}

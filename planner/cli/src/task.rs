@@ -1,0 +1,120 @@
+//! `planner task`.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nullsweep_planner::progress::Progress;
+use nullsweep_planner::task::{self, Figures, TaskConfig, Tolerance};
+
+use crate::bars::Bars;
+use crate::robot::RobotArgs;
+use crate::{OK, VIOLATIONS, write_json};
+
+#[derive(Debug, Args)]
+pub(super) struct TaskArgs {
+    /// Poses of the tool in the robot's root frame: time,x,y,z,qx,qy,qz,qw a line.
+    poses: PathBuf,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// The tool, a TOML file, whose contact frame meets the poses; without it the tip frame itself.
+    #[arg(long, value_name = "FILE")]
+    tool: Option<PathBuf>,
+    /// How far the tool may be from a pose, along and about its axes: X,Y,Z,RX,RY,RZ, in metres
+    /// and radians or `free`.
+    #[arg(long, value_name = "TOLERANCE", default_value = "0,0,0,0,0,free")]
+    tolerance: Tolerance,
+    /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
+    #[arg(long)]
+    v_max: Option<f64>,
+    /// Rounds of order and relaxation.
+    #[arg(long, default_value_t = 4)]
+    rounds: usize,
+    /// Trials of the order's search for each pose in each round.
+    #[arg(long, default_value_t = 20)]
+    trials: u64,
+    /// Seed of every random choice: the same seed gives the same plan.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where the plan is written.
+    #[arg(long, short, value_name = "FILE", default_value = "plan.json")]
+    out: PathBuf,
+    /// Write every figure of the run as JSON to a file, or `-`.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
+    let bars = Bars::new();
+    let robot = args.robot.robot()?;
+    let poses = task::read(&args.poses)?;
+    let tool = match &args.tool {
+        None => task::tip_tool(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("cannot read {}", path.display()))?;
+            toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))?
+        }
+    };
+    let config = TaskConfig {
+        arm: args.robot.spec()?,
+        tool,
+        tolerance: args.tolerance,
+        held: Vec::new(),
+        obstacles: Vec::new(),
+        collision: args.robot.collision(),
+        v_max: args.v_max,
+        rounds: args.rounds.max(1),
+        trials: args.trials.max(1),
+        seed: args.seed,
+    };
+    let outcome = task::run(&robot, &poses, &config, &bars);
+    bars.clear();
+    let outcome = outcome?;
+    let figures = &outcome.figures;
+    for note in &figures.notes {
+        bars.note(note);
+    }
+    let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
+    if let Some(path) = &args.json {
+        write_json(figures, path)?;
+    }
+    if !to_stdout {
+        println!("{}", table(figures));
+    }
+    let violations = &outcome.verification.violations;
+    if violations.is_empty() {
+        outcome.plan.write(&args.out)?;
+        if !to_stdout {
+            println!("plan: {}", args.out.display());
+        }
+        return Ok(OK);
+    }
+    for v in violations.iter().take(10) {
+        eprintln!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail);
+    }
+    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
+    Ok(VIOLATIONS)
+}
+
+fn table(f: &Figures) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+    let mm = |metres: f64| format!("{:.2}", metres * 1e3);
+    let deviation = format!("{}, {} mm", mm(f.edge_deviation_p90_m), mm(f.edge_deviation_max_m));
+    table.add_rows([
+        ["poses, met".to_owned(), format!("{}, {}", f.poses, f.met)],
+        ["joint movement (L2)".to_owned(), format!("{:.2} rad", f.movement_rad)],
+        ["reconfigurations".to_owned(), f.reconfigurations.to_string()],
+        ["effort, transfers included".to_owned(), format!("{:.2} rad", f.effort_rad)],
+        ["task time".to_owned(), format!("{:.2} s", f.task_time_s)],
+        ["beyond the tolerance, max".to_owned(), format!("{:.1e}", f.excess_max)],
+        ["edge deviation, p90, max".to_owned(), deviation],
+        ["violations".to_owned(), f.violations.to_string()],
+        ["calculation".to_owned(), format!("{:.2} s", f.calc_time_s)],
+        ["verification".to_owned(), format!("{:.2} s", f.verify_time_s)],
+    ]);
+    table
+}

@@ -1,0 +1,295 @@
+//! The fast check: bounds first, exact distances where they do not suffice.
+
+use nalgebra::Vector3;
+use nullsweep_robot::JointVector;
+use parry3d_f64::query::{DefaultQueryDispatcher, QueryDispatcher};
+use parry3d_f64::shape::SharedShape;
+
+use crate::bodies::MAX_BODIES;
+use crate::frame::Frame;
+use crate::motion::Slack;
+use crate::proof::Check;
+use crate::solid::Solid;
+use crate::spheres::Sphere;
+use crate::world::{Fixed, Moving, World};
+use crate::{Hit, ToolContact};
+
+/// What the fast check asks for beyond every margin, so that its rounding never makes it pass what
+/// the exact check rejects. \[m\]
+pub(crate) const TOLERANCE: f64 = 1e-8;
+
+/// Spheres looked at before a pair of shapes goes to GJK, which costs about as much.
+const SPHERES: usize = 24;
+
+impl World {
+    /// Whether everything that moves with the arm keeps its margins. NaN and ∞ are not free.
+    #[must_use]
+    pub fn is_free(&self, q: &JointVector, contact: ToolContact) -> bool {
+        self.is_in_range(q) && self.are_clear(&self.bodies.poses(q), contact, &Slack::NONE)
+    }
+
+    /// The first pair too near, for messages; from the exact check, so it is slow.
+    #[must_use]
+    pub fn why_not(&self, q: &JointVector, contact: ToolContact) -> Option<Hit> {
+        self.exact().first_hit(q, contact)
+    }
+
+    /// Whether all margins hold with the slack of each body added, the bodies standing at `poses`.
+    pub(crate) fn are_clear(
+        &self,
+        poses: &[Frame; MAX_BODIES],
+        contact: ToolContact,
+        slack: &Slack<'_>,
+    ) -> bool {
+        // The fixed shapes that the ball about each body does not prove far.
+        let mut near = [0u128; MAX_BODIES];
+        for (body, (centre, radius)) in self.reach.ball.iter().enumerate() {
+            let centre = poses[body].apply(centre);
+            for (index, fixed) in self.fixed.iter().enumerate() {
+                let reach = radius + fixed.margin + slack.body[body] + TOLERANCE;
+                if fixed.box_distance_squared(&centre) < reach * reach {
+                    near[body] |= fixed_bit(index);
+                }
+            }
+        }
+        self.moving.iter().rev().all(|shape| {
+            let (body, pose) = (shape.body, &poses[shape.body]);
+            let need = slack.body[body] + TOLERANCE;
+            self.is_clear_of_scan(shape, pose, contact, need)
+                && (near[body] == 0 || self.is_clear_of_fixed(shape, pose, near[body], need))
+        }) && self.are_pairs_clear(poses, slack)
+    }
+
+    fn is_clear_of_scan(
+        &self,
+        shape: &Moving,
+        pose: &Frame,
+        contact: ToolContact,
+        slack: f64,
+    ) -> bool {
+        let touch = match contact {
+            ToolContact::Allowed => shape.touch.as_ref(),
+            ToolContact::Forbidden => None,
+        };
+        let margin = match touch {
+            // The pad is clear if no point is where its keep-out boxes are.
+            Some(touch) if touch.depth == f64::INFINITY => {
+                let far =
+                    |s: &Sphere| self.field.is_farther(&pose.apply(&s.centre), s.radius + slack);
+                let holds =
+                    |p: &Vector3<f64>| self.point_value(shape, pose, contact, p, slack) >= slack;
+                return touch.tree.all(far, |_| false)
+                    || touch.guards.iter().all(|(place, solid)| {
+                        self.field.all_near(solid, &pose.then(place), slack, holds)
+                    });
+            }
+            Some(touch) => touch.margin,
+            None => self.margins.environment,
+        };
+        let need = margin + slack;
+        if shape
+            .tree
+            .all(|s| self.field.is_farther(&pose.apply(&s.centre), s.radius + need), |_| false)
+        {
+            return true;
+        }
+        self.field.all_near(&shape.solid, &pose.then(&shape.place), need, |p| {
+            self.point_value(shape, pose, contact, p, slack) >= slack
+        })
+    }
+
+    /// Whether one check holds with the slack added, the bodies standing at `poses`.
+    pub(super) fn holds(
+        &self,
+        check: Check,
+        poses: &[Frame; MAX_BODIES],
+        contact: ToolContact,
+        slack: &Slack<'_>,
+    ) -> bool {
+        match check {
+            Check::Scan(shape) => {
+                let shape = &self.moving[shape];
+                let need = slack.body[shape.body] + TOLERANCE;
+                self.is_clear_of_scan(shape, &poses[shape.body], contact, need)
+            }
+            Check::Fixed(shape) => {
+                let shape = &self.moving[shape];
+                let need = slack.body[shape.body] + TOLERANCE;
+                self.is_clear_of_fixed(shape, &poses[shape.body], u128::MAX, need)
+            }
+            Check::Pair(pair) => {
+                let (a, b) = self.pairs[pair];
+                let between = slack.between(self.moving[a].body, self.moving[b].body);
+                let need = self.margins.self_clearance + between + TOLERANCE;
+                self.is_moving_pair_clear(a, b, poses, need)
+            }
+        }
+    }
+
+    /// The bodies that the checks are about, one bit each.
+    pub(super) fn bodies_of(&self, checks: &[Check]) -> u32 {
+        let bit = |shape: usize| 1u32 << self.moving[shape].body;
+        checks.iter().fold(0, |bits, check| match *check {
+            Check::Scan(shape) | Check::Fixed(shape) => bits | bit(shape),
+            Check::Pair(pair) => bits | bit(self.pairs[pair].0) | bit(self.pairs[pair].1),
+        })
+    }
+
+    /// A lower bound of how far the shape can move, relative to the scan point `p` (root frame),
+    /// before the point breaks the rules; negative if it does now. Not looked at more closely than
+    /// to tell whether it is at least `enough`. \[m\]
+    pub(crate) fn point_value(
+        &self,
+        shape: &Moving,
+        pose: &Frame,
+        contact: ToolContact,
+        p: &Vector3<f64>,
+        enough: f64,
+    ) -> f64 {
+        let in_body = pose.apply_inverse(p);
+        let local = shape.place.apply_inverse(&in_body);
+        let (Some(touch), ToolContact::Allowed) = (&shape.touch, contact) else {
+            let margin = self.margins.environment;
+            return distance_for(&shape.solid, &local, margin + enough) - margin;
+        };
+        let distance = distance_for(&shape.solid, &local, touch.margin + enough);
+        let free = distance - touch.margin;
+        if free >= enough {
+            return free;
+        }
+        let at = self.contact.frame.apply_inverse(&in_body);
+        let in_prism = (0..3).all(|i| at[i] >= self.contact.min[i] && at[i] <= self.contact.max[i]);
+        if !in_prism && free < 0.0 {
+            return free;
+        }
+        // What is left is to stay out of the keep-out boxes and not too deep in the shape.
+        touch
+            .keep_out
+            .iter()
+            .map(|(min, max)| box_distance(min, max, &at))
+            .fold(distance + touch.depth, f64::min)
+            .max(free)
+    }
+
+    fn is_clear_of_fixed(&self, shape: &Moving, pose: &Frame, near: u128, slack: f64) -> bool {
+        let root = shape.tree.root();
+        let centre = pose.apply(&root.centre);
+        shape.against.iter().filter(|&&index| near & fixed_bit(index) != 0).all(|&index| {
+            let fixed = &self.fixed[index];
+            let need = fixed.margin + slack;
+            let reach = root.radius + need;
+            fixed.box_distance_squared(&centre) >= reach * reach
+                || is_pair_clear(
+                    shape,
+                    &fixed.place.inverse_then(pose),
+                    &fixed.solid,
+                    &Frame::IDENTITY,
+                    &fixed.shape,
+                    need,
+                )
+        })
+    }
+
+    fn are_pairs_clear(&self, poses: &[Frame; MAX_BODIES], slack: &Slack<'_>) -> bool {
+        let mut balls = [Vector3::zeros(); MAX_BODIES];
+        for (body, (centre, _)) in self.reach.ball.iter().enumerate() {
+            balls[body] = poses[body].apply(centre);
+        }
+        let mut bodies = (usize::MAX, usize::MAX);
+        let (mut need, mut far) = (0.0, false);
+        self.pairs.iter().all(|&(a, b)| {
+            let (i, j) = (self.moving[a].body, self.moving[b].body);
+            if bodies != (i, j) {
+                // The pairs of two bodies follow each other.
+                bodies = (i, j);
+                need = self.margins.self_clearance + slack.between(i, j) + TOLERANCE;
+                let reach = self.reach.ball[i].1 + self.reach.ball[j].1 + need;
+                far = (balls[i] - balls[j]).norm_squared() >= reach * reach;
+            }
+            if far {
+                return true;
+            }
+            self.is_moving_pair_clear(a, b, poses, need)
+        })
+    }
+
+    fn is_moving_pair_clear(
+        &self,
+        a: usize,
+        b: usize,
+        poses: &[Frame; MAX_BODIES],
+        need: f64,
+    ) -> bool {
+        let (first, second) = (&self.moving[a], &self.moving[b]);
+        let (ra, rb) = (first.tree.root().radius, second.tree.root().radius);
+        let reach = ra + rb + need;
+        let between = poses[first.body].apply(&first.tree.root().centre)
+            - poses[second.body].apply(&second.tree.root().centre);
+        if between.norm_squared() >= reach * reach {
+            return true;
+        }
+        // The spheres of the smaller shape against the solid of the larger.
+        let (small, large) = if ra <= rb { (first, second) } else { (second, first) };
+        let relative = poses[large.body].inverse_then(&poses[small.body]);
+        is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
+    }
+}
+
+/// The bit of a fixed shape; beyond 127 they share the last one.
+#[inline]
+fn fixed_bit(index: usize) -> u128 {
+    1 << index.min(127)
+}
+
+impl Fixed {
+    /// Squared distance from a point of the root frame to the axis-aligned bounds. \[m²\]
+    #[inline]
+    pub(crate) fn box_distance_squared(&self, p: &Vector3<f64>) -> f64 {
+        let outside = |i: usize| (self.min[i] - p[i]).max(p[i] - self.max[i]).max(0.0);
+        let (x, y, z) = (outside(0), outside(1), outside(2));
+        x * x + y * y + z * z
+    }
+}
+
+/// Whether `shape`, its body at `relative` in some frame, is at least `need` from the solid that
+/// stands at `place` in that frame.
+fn is_pair_clear(
+    shape: &Moving,
+    relative: &Frame,
+    solid: &Solid,
+    place: &Frame,
+    other: &SharedShape,
+    need: f64,
+) -> bool {
+    let local = place.inverse_then(relative);
+    let pose = local.then(&shape.place);
+    if solid.is_separated(&shape.solid, &pose, need) {
+        return true;
+    }
+    let mut seen = 0;
+    shape.tree.all(
+        |s| {
+            seen += 1;
+            seen <= SPHERES && solid.distance_bound(&local.apply(&s.centre)) >= s.radius + need
+        },
+        |_| false,
+    ) || gjk_distance(&pose, other, &shape.shape) >= need
+}
+
+/// Distance between two shapes, the second at `pose` in the first's frame; 0 if they overlap. \[m\]
+pub(crate) fn gjk_distance(pose: &Frame, first: &SharedShape, second: &SharedShape) -> f64 {
+    DefaultQueryDispatcher
+        .distance(&pose.to_parry(), &**first, &**second)
+        .map_or(0.0, |found| found.distance)
+}
+
+/// The signed distance, but only a lower bound of it where that already is `enough`. \[m\]
+fn distance_for(solid: &Solid, p: &Vector3<f64>, enough: f64) -> f64 {
+    let bound = solid.distance_bound(p);
+    if bound >= enough { bound } else { solid.distance(p) }
+}
+
+/// Distance from `p` to a box, 0 inside. \[m\]
+fn box_distance(min: &Vector3<f64>, max: &Vector3<f64>, p: &Vector3<f64>) -> f64 {
+    (min - p).sup(&(p - max)).map(|x| x.max(0.0)).norm()
+}

@@ -1,0 +1,199 @@
+//! Convex solids in their own frame: signed distances for the fast check, parry's shapes for GJK.
+
+use nalgebra::{Point3, Vector3};
+use parry3d_f64::math::Vec3;
+use parry3d_f64::query::PointQuery;
+use parry3d_f64::shape::{ConvexPolyhedron, SharedShape};
+
+use crate::frame::Frame;
+
+/// A convex solid about its own origin; lengths in \[m\].
+#[derive(Clone)]
+pub(crate) enum Solid {
+    Ball {
+        radius: f64,
+    },
+    /// Axis z; the caps are beyond `half`.
+    Capsule {
+        half: f64,
+        radius: f64,
+    },
+    /// Axis y, as parry has it: a URDF cylinder (axis z) is turned where it is read.
+    Cylinder {
+        half: f64,
+        radius: f64,
+    },
+    Box {
+        half: Vector3<f64>,
+    },
+    Hull(Box<Hull>),
+    /// All of z ≤ 0.
+    HalfSpace,
+}
+
+/// A convex polyhedron with its face planes.
+#[derive(Clone)]
+pub(crate) struct Hull {
+    shape: ConvexPolyhedron,
+    /// Outward unit normal and offset of each face; every vertex satisfies n·v ≤ offset.
+    planes: Vec<(Vector3<f64>, f64)>,
+    min: Vector3<f64>,
+    max: Vector3<f64>,
+}
+
+impl Hull {
+    /// The convex hull of the points; `None` if they are fewer than four, not finite, or flat.
+    pub(crate) fn new(points: &[Point3<f64>]) -> Option<Self> {
+        if points.len() < 4 || points.iter().any(|p| !p.coords.iter().all(|x| x.is_finite())) {
+            return None;
+        }
+        let vertices: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect();
+        let shape = ConvexPolyhedron::from_convex_hull(&vertices)?;
+        // The faces come from a numeric hull that may shave off a vertex by a rounding error:
+        // offsets are taken over all input points, so that no plane cuts into the solid.
+        let planes = shape
+            .faces()
+            .iter()
+            .map(|face| {
+                let n = Vector3::new(face.normal.x, face.normal.y, face.normal.z);
+                let offset = points.iter().map(|p| n.dot(&p.coords)).fold(f64::MIN, f64::max);
+                (n, offset)
+            })
+            .collect();
+        let (mut min, mut max) = (points[0].coords, points[0].coords);
+        for p in points {
+            min = min.inf(&p.coords);
+            max = max.sup(&p.coords);
+        }
+        Some(Self { shape, planes, min, max })
+    }
+
+    /// Outward unit normal and offset of each face.
+    pub(crate) fn planes(&self) -> &[(Vector3<f64>, f64)] {
+        &self.planes
+    }
+}
+
+impl Solid {
+    /// A lower bound of the signed distance \[m\] from `p` to the solid (negative inside). Exact for
+    /// all but a hull's edges and vertices as seen from outside.
+    #[inline]
+    pub(crate) fn distance_bound(&self, p: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Ball { radius } => p.norm() - radius,
+            Self::Capsule { half, radius } => {
+                let z = (p.z.abs() - half).max(0.0);
+                (p.x * p.x + p.y * p.y + z * z).sqrt() - radius
+            }
+            Self::Cylinder { half, radius } => {
+                let radial = (p.x * p.x + p.z * p.z).sqrt() - radius;
+                let axial = p.y.abs() - half;
+                let (r, a) = (radial.max(0.0), axial.max(0.0));
+                (r * r + a * a).sqrt() + radial.max(axial).min(0.0)
+            }
+            Self::Box { half } => {
+                let q = p.abs() - half;
+                let outside = q.map(|x| x.max(0.0));
+                outside.norm() + q.max().min(0.0)
+            }
+            Self::Hull(hull) => {
+                hull.planes.iter().map(|(n, offset)| n.dot(p) - offset).fold(f64::MIN, f64::max)
+            }
+            Self::HalfSpace => p.z,
+        }
+    }
+
+    /// The signed distance \[m\] from `p` to the solid.
+    pub(crate) fn distance(&self, p: &Vector3<f64>) -> f64 {
+        let bound = self.distance_bound(p);
+        match self {
+            Self::Hull(hull) if bound > 0.0 => {
+                hull.shape.distance_to_local_point(Vec3::new(p.x, p.y, p.z), true).max(bound)
+            }
+            _ => bound,
+        }
+    }
+
+    /// The axis-aligned bounds in the solid's frame \[m\]; infinite for a half-space.
+    pub(crate) fn bounds(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let symmetric = |h: Vector3<f64>| (-h, h);
+        match self {
+            Self::Ball { radius } => symmetric(Vector3::repeat(*radius)),
+            Self::Capsule { half, radius } => {
+                symmetric(Vector3::new(*radius, *radius, half + radius))
+            }
+            Self::Cylinder { half, radius } => symmetric(Vector3::new(*radius, *half, *radius)),
+            Self::Box { half } => symmetric(*half),
+            Self::Hull(hull) => (hull.min, hull.max),
+            Self::HalfSpace => (
+                Vector3::repeat(f64::NEG_INFINITY),
+                Vector3::new(f64::INFINITY, f64::INFINITY, 0.0),
+            ),
+        }
+    }
+
+    /// Centre of the bounds, which all but hulls have at the origin. \[m\]
+    #[inline]
+    fn centre(&self) -> Vector3<f64> {
+        match self {
+            Self::Hull(hull) => 0.5 * (hull.min + hull.max),
+            _ => Vector3::zeros(),
+        }
+    }
+
+    /// How far the solid reaches from its centre along a unit vector, at most. \[m\]
+    #[inline]
+    pub(crate) fn extent(&self, n: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Ball { radius } => *radius,
+            Self::Capsule { half, radius } => half * n.z.abs() + radius,
+            Self::Cylinder { half, radius } => {
+                half * n.y.abs() + radius * (n.x * n.x + n.z * n.z).sqrt()
+            }
+            Self::Box { half } => half.dot(&n.abs()),
+            Self::Hull(hull) => 0.5 * (hull.max - hull.min).dot(&n.abs()),
+            Self::HalfSpace => f64::INFINITY,
+        }
+    }
+
+    /// Whether a plane across an axis of either solid, or across the line of their centres, proves
+    /// them `need` apart; `other` stands at `pose` in this solid's frame.
+    pub(crate) fn is_separated(&self, other: &Self, pose: &Frame, need: f64) -> bool {
+        let between = pose.apply(&other.centre()) - self.centre();
+        let gap = |n: &Vector3<f64>| {
+            between.dot(n).abs() - self.extent(n) - other.extent(&pose.rotation.tr_mul(n))
+        };
+        (0..3).any(|i| {
+            gap(&Vector3::ith(i, 1.0)) >= need || gap(&pose.rotation.column(i).into_owned()) >= need
+        }) || between.try_normalize(1e-9).is_some_and(|n| gap(&n) >= need)
+    }
+
+    /// Radius \[m\] of the sphere about the centre of the bounds that holds the solid.
+    pub(crate) fn bounding_radius(&self) -> f64 {
+        match self {
+            Self::Ball { radius } => *radius,
+            Self::Capsule { half, radius } => half + radius,
+            Self::Cylinder { half, radius } => half.hypot(*radius),
+            Self::Box { half } => half.norm(),
+            Self::Hull(hull) => {
+                let centre = 0.5 * (hull.min + hull.max);
+                let farthest =
+                    |r: f64, v: &Vec3| r.max((Vector3::new(v.x, v.y, v.z) - centre).norm());
+                hull.shape.points().iter().fold(0.0, farthest) + 1e-9
+            }
+            Self::HalfSpace => f64::INFINITY,
+        }
+    }
+
+    /// The same solid as a parry shape.
+    pub(crate) fn to_parry(&self) -> SharedShape {
+        match self {
+            Self::Ball { radius } => SharedShape::ball(*radius),
+            Self::Capsule { half, radius } => SharedShape::capsule_z(*half, *radius),
+            Self::Cylinder { half, radius } => SharedShape::cylinder(*half, *radius),
+            Self::Box { half } => SharedShape::cuboid(half.x, half.y, half.z),
+            Self::Hull(hull) => SharedShape::new(hull.shape.clone()),
+            Self::HalfSpace => SharedShape::halfspace(Vec3::new(0.0, 0.0, 1.0)),
+        }
+    }
+}

@@ -1,0 +1,348 @@
+//! Edge assembly crossover on the orders of clusters (after Nagata & Kobayashi, INFORMS J. Comput.
+//! 25(2), 2013), with nodes chosen anew wherever the order has changed.
+//!
+//! Arcs that only one parent has form cycles which alternate between the parents. Applying one of
+//! them to the first parent exchanges some of its arcs for the second one's; subtours that arise
+//! are patched together at least cost.
+
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::local::LocalSearch;
+use crate::order::Order;
+use crate::table::Table;
+
+const NONE: u32 = u32::MAX;
+
+/// Neighbours of every cluster: predecessor and successor; without directions where reversible.
+type Links = Vec<[u32; 2]>;
+
+/// Scratch space of the crossover.
+#[derive(Default)]
+pub(super) struct Crossover {
+    a: Links,
+    b: Links,
+    rest_a: Links,
+    rest_b: Links,
+    /// Clusters along all cycles, one after the other; the first is not repeated at the end.
+    cycle: Vec<u32>,
+    ends: Vec<usize>,
+    path: Vec<u32>,
+    seen: Vec<[u32; 2]>,
+    child: Links,
+    part: Vec<u32>,
+    parts: Vec<u32>,
+    touched: Vec<u32>,
+}
+
+fn links(tour: &Order, into: &mut Links) {
+    let m = tour.order.len();
+    into.clear();
+    into.resize(m, [NONE; 2]);
+    for p in 0..m {
+        let next = tour.order[if p + 1 == m { 0 } else { p + 1 }];
+        into[tour.order[p] as usize][1] = next;
+        into[next as usize][0] = tour.order[p];
+    }
+}
+
+fn replace(links: &mut Links, at: u32, old: u32, new: u32) {
+    let slots = &mut links[at as usize];
+    let k = usize::from(slots[0] != old);
+    debug_assert_eq!(slots[k], old);
+    slots[k] = new;
+}
+
+impl Crossover {
+    /// Splits the difference of two tours into alternating cycles; returns how many there are.
+    pub(super) fn prepare(
+        &mut self,
+        table: &Table,
+        a: &Order,
+        b: &Order,
+        rng: &mut ChaCha8Rng,
+    ) -> usize {
+        links(a, &mut self.a);
+        links(b, &mut self.b);
+        self.cycle.clear();
+        self.ends.clear();
+        if table.reversible {
+            self.undirected_cycles(rng);
+        } else {
+            self.directed_cycles();
+        }
+        self.ends.len()
+    }
+
+    fn directed_cycles(&mut self) {
+        let m = self.a.len();
+        self.part.clear();
+        self.part.resize(m, 0);
+        for start in 0..m as u32 {
+            if self.part[start as usize] != 0
+                || self.a[start as usize][1] == self.b[start as usize][1]
+            {
+                continue;
+            }
+            let mut here = start;
+            loop {
+                self.part[here as usize] = 1;
+                let head = self.a[here as usize][1];
+                self.cycle.push(here);
+                self.cycle.push(head);
+                here = self.b[head as usize][0];
+                if here == start {
+                    break;
+                }
+            }
+            self.ends.push(self.cycle.len());
+        }
+    }
+
+    fn undirected_cycles(&mut self, rng: &mut ChaCha8Rng) {
+        let m = self.a.len();
+        self.rest_a.clear();
+        self.rest_b.clear();
+        for c in 0..m {
+            let only = |mine: [u32; 2], other: [u32; 2]| {
+                let keep = |x: u32| if other.contains(&x) { NONE } else { x };
+                let (x, y) = (keep(mine[0]), keep(mine[1]));
+                if x == NONE { [y, NONE] } else { [x, y] }
+            };
+            self.rest_a.push(only(self.a[c], self.b[c]));
+            self.rest_b.push(only(self.b[c], self.a[c]));
+        }
+        self.seen.clear();
+        self.seen.resize(m, [NONE; 2]);
+        let offset = rng.random_range(0..m);
+        for k in 0..m {
+            let start = ((k + offset) % m) as u32;
+            while self.rest_a[start as usize][0] != NONE {
+                self.path.clear();
+                self.path.push(start);
+                self.seen[start as usize][0] = 0;
+                self.walk(rng);
+                self.seen[start as usize][0] = NONE;
+            }
+        }
+    }
+
+    /// Walks at random along remaining arcs, cutting cycles off the path until nothing is left.
+    fn walk(&mut self, rng: &mut ChaCha8Rng) {
+        loop {
+            let steps = self.path.len() - 1;
+            let here = self.path[steps];
+            let rest = if steps.is_multiple_of(2) { &mut self.rest_a } else { &mut self.rest_b };
+            let slots = rest[here as usize];
+            if slots[0] == NONE {
+                debug_assert_eq!(steps, 0);
+                return;
+            }
+            let next = if slots[1] != NONE && rng.random::<bool>() { slots[1] } else { slots[0] };
+            remove(rest, here, next);
+            remove(rest, next, here);
+            let parity = (steps + 1) % 2;
+            let earlier = self.seen[next as usize][parity];
+            if earlier == NONE {
+                self.seen[next as usize][parity] = self.path.len() as u32;
+                self.path.push(next);
+                continue;
+            }
+            // Stored so that the first arc of a cycle belongs to the first parent.
+            let from = earlier as usize;
+            let length = self.path.len() - from;
+            for k in 0..length {
+                self.cycle.push(self.path[from + (k + parity) % length]);
+            }
+            self.ends.push(self.cycle.len());
+            while self.path.len() > from + 1 {
+                let c = self.path.pop().unwrap_or(next);
+                self.seen[c as usize][self.path.len() % 2] = NONE;
+            }
+        }
+    }
+
+    /// Applies cycle `k` to the first parent, whose nodes are `chosen`, patches, chooses nodes and
+    /// improves locally.
+    pub(super) fn child(
+        &mut self,
+        table: &Table,
+        b: &Order,
+        k: usize,
+        chosen: &[u32],
+        local: &mut LocalSearch,
+        out: &mut Order,
+    ) {
+        let from = if k == 0 { 0 } else { self.ends[k - 1] };
+        let cycle = &self.cycle[from..self.ends[k]];
+        self.child.clone_from(&self.a);
+        self.touched.clear();
+        self.touched.extend_from_slice(cycle);
+        if table.reversible {
+            for pair in cycle.chunks_exact(2) {
+                replace(&mut self.child, pair[0], pair[1], NONE);
+                replace(&mut self.child, pair[1], pair[0], NONE);
+            }
+            for i in (1..cycle.len()).step_by(2) {
+                let (x, y) = (cycle[i], cycle[(i + 1) % cycle.len()]);
+                replace(&mut self.child, x, NONE, y);
+                replace(&mut self.child, y, NONE, x);
+            }
+        } else {
+            for i in (0..cycle.len()).step_by(2) {
+                let head = cycle[i + 1];
+                let tail = cycle[(i + 2) % cycle.len()];
+                self.child[head as usize][0] = tail;
+                self.child[tail as usize][1] = head;
+            }
+        }
+        out.chosen.copy_from_slice(chosen);
+        for c in &self.touched {
+            let c = *c as usize;
+            let (mine, other) = (self.child[c], self.b[c]);
+            if mine == other || (table.reversible && mine[0] == other[1] && mine[1] == other[0]) {
+                out.chosen[c] = b.chosen[c];
+            }
+        }
+        self.patch(table, &out.chosen);
+        self.unroll(table, out);
+        for c in &self.touched {
+            local.push(*c);
+        }
+        local.run(table, out);
+    }
+
+    /// Next cluster when coming from `from`.
+    fn onward(&self, table: &Table, from: u32, at: u32) -> u32 {
+        let slots = self.child[at as usize];
+        if !table.reversible || slots[0] == from { slots[1] } else { slots[0] }
+    }
+
+    /// Joins all subtours, smallest first, by the cheapest exchange of two arcs.
+    fn patch(&mut self, table: &Table, chosen: &[u32]) {
+        let m = self.child.len();
+        self.part.clear();
+        self.part.resize(m, NONE);
+        self.parts.clear();
+        for start in 0..m as u32 {
+            if self.part[start as usize] != NONE {
+                continue;
+            }
+            let id = self.parts.len() as u32;
+            let mut size = 0;
+            let (mut from, mut here) = (self.child[start as usize][0], start);
+            while self.part[here as usize] == NONE {
+                self.part[here as usize] = id;
+                size += 1;
+                (from, here) = (here, self.onward(table, from, here));
+            }
+            self.parts.push(size);
+        }
+        let d = |x: u32, y: u32| i64::from(table.d(x, chosen[x as usize], y, chosen[y as usize]));
+        let mut left = self.parts.len();
+        while left > 1 {
+            let smallest = (0..self.parts.len()).filter(|&k| self.parts[k] > 0);
+            let id = smallest.min_by_key(|&k| self.parts[k]).unwrap_or(0) as u32;
+            let mut best = (i64::MAX, [NONE; 4]);
+            for all in [false, true] {
+                for x in 0..m as u32 {
+                    if self.part[x as usize] != id {
+                        continue;
+                    }
+                    if all {
+                        for n in 0..m as u32 {
+                            self.try_patch(table, &d, id, x, n, &mut best);
+                        }
+                    } else {
+                        for (n, _) in table.near_out(x) {
+                            self.try_patch(table, &d, id, x, n, &mut best);
+                        }
+                    }
+                }
+                if best.0 < i64::MAX {
+                    break;
+                }
+            }
+            // x–y and u–v become x–u and y–v; directed: x→y, v→u become x→u, v→y.
+            let [x, y, u, v] = best.1;
+            replace_arc(&mut self.child, table.reversible, x, y, u, v);
+            self.touched.extend_from_slice(&[x, y, u, v]);
+            let other = self.part[u as usize];
+            for p in &mut self.part {
+                if *p == id {
+                    *p = other;
+                }
+            }
+            self.parts[other as usize] += self.parts[id as usize];
+            self.parts[id as usize] = 0;
+            left -= 1;
+        }
+    }
+
+    fn try_patch(
+        &self,
+        table: &Table,
+        d: &impl Fn(u32, u32) -> i64,
+        id: u32,
+        x: u32,
+        u: u32,
+        best: &mut (i64, [u32; 4]),
+    ) {
+        if self.part[u as usize] == id {
+            return;
+        }
+        if table.reversible {
+            for y in self.child[x as usize] {
+                for v in self.child[u as usize] {
+                    let delta = d(x, u) + d(y, v) - d(x, y) - d(u, v);
+                    if delta < best.0 {
+                        *best = (delta, [x, y, u, v]);
+                    }
+                }
+            }
+        } else {
+            let (y, v) = (self.child[x as usize][1], self.child[u as usize][0]);
+            let delta = d(x, u) + d(v, y) - d(x, y) - d(v, u);
+            if delta < best.0 {
+                *best = (delta, [x, y, u, v]);
+            }
+        }
+    }
+
+    /// The order from the root on, in the cheaper direction.
+    fn unroll(&self, table: &Table, out: &mut Order) {
+        let root = table.root as u32;
+        let [x, y] = self.child[root as usize];
+        let d = |x: u32, y: u32| table.d(x, out.chosen[x as usize], y, out.chosen[y as usize]);
+        let backwards = table.reversible && d(root, x) + d(y, root) < d(root, y) + d(x, root);
+        let (mut from, mut here) = if backwards { (y, root) } else { (x, root) };
+        for p in 0..out.order.len() {
+            out.order[p] = here;
+            out.position[here as usize] = p as u32;
+            (from, here) = (here, self.onward(table, from, here));
+        }
+        out.refresh_all(table);
+    }
+}
+
+fn remove(rest: &mut Links, at: u32, other: u32) {
+    let slots = &mut rest[at as usize];
+    if slots[0] == other {
+        slots[0] = slots[1];
+    }
+    slots[1] = NONE;
+}
+
+fn replace_arc(links: &mut Links, reversible: bool, x: u32, y: u32, u: u32, v: u32) {
+    if reversible {
+        replace(links, x, y, u);
+        replace(links, y, x, v);
+        replace(links, u, v, x);
+        replace(links, v, u, y);
+    } else {
+        links[x as usize][1] = u;
+        links[u as usize][0] = x;
+        links[v as usize][1] = y;
+        links[y as usize][0] = v;
+    }
+}

@@ -1,0 +1,143 @@
+//! A pool of local optima that is crossed until it agrees.
+
+use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::eax::Crossover;
+use crate::local::LocalSearch;
+use crate::order::Order;
+use crate::search::{Cooling, SMALL, construct, iterate, settle};
+use crate::solve::{Record, Streams};
+use crate::table::Table;
+
+/// Tours in the first epoch's pool; later epochs double it up to three times.
+const FIRST_POOL: usize = 30;
+/// Trials per cluster that each tour of a fresh pool gets.
+const TRIALS_PER_CLUSTER: u64 = 5;
+/// Children made of one pair of parents at most.
+const CHILDREN: usize = 30;
+/// Generations without an improvement that end an epoch.
+const IDLE_GENERATIONS: u32 = 3;
+
+/// How large an epoch may be.
+#[derive(Clone, Copy)]
+pub(super) struct Epoch {
+    /// From 0 on.
+    pub(super) number: u32,
+    /// Most trials.
+    pub(super) limit: u64,
+    /// How many the time may suffice for.
+    pub(super) likely: u64,
+}
+
+/// One epoch: a fresh pool, crossed until nothing improves; then its best tour is crossed with
+/// those of the earlier epochs, whose list it joins.
+pub(super) fn evolve(
+    table: &Table,
+    epoch: Epoch,
+    elite: &mut Vec<Order>,
+    streams: &mut Streams,
+    stop: &(dyn Fn() -> bool + Sync),
+    record: &mut Record<'_, '_>,
+) {
+    let Epoch { number, limit, likely } = epoch;
+    let size = (FIRST_POOL as u64) << number.min(3);
+    // Small budgets get small pools: half of the trials are left for the crossing.
+    let sure = limit.min(likely);
+    let size = size.min(sure / 64).max(1) as usize;
+    let size = if table.m < SMALL { 1 } else { size };
+    let trials = (TRIALS_PER_CLUSTER * table.m as u64).min(sure / (2 * size as u64));
+    let tasks: Vec<_> = (0..size).map(|k| (k, streams.next())).collect();
+    let fresh: Vec<(Order, u64)> = tasks
+        .into_par_iter()
+        .filter_map(|(k, mut rng)| {
+            if k > 0 && stop() {
+                return None;
+            }
+            let mut local = LocalSearch::new(table.m);
+            let mut tour = construct(table, &mut rng);
+            settle(table, &mut local, &mut tour);
+            let cooling = Cooling { trials, from: 0.3, to: 0.03 };
+            let made = iterate(table, &mut local, &mut tour, cooling, &mut rng, stop);
+            Some((tour, made + 1))
+        })
+        .collect();
+    record.made += fresh.iter().map(|(_, made)| made).sum::<u64>();
+    let mut pool: Vec<Order> = fresh.into_iter().map(|(tour, _)| tour).collect();
+    record.offer(table.tour(&pool[best_of(&pool)]));
+    let end = record.made.saturating_add(limit.saturating_sub(trials * size as u64));
+    cross_until_idle(table, &mut pool, end, streams, stop, record);
+    let winner = best_of(&pool);
+    elite.push(pool.swap_remove(winner));
+    if elite.len() > 1 {
+        cross_until_idle(table, &mut elite.clone(), end, streams, stop, record);
+    }
+}
+
+fn best_of(pool: &[Order]) -> usize {
+    (0..pool.len()).min_by_key(|&k| pool[k].cost).unwrap_or(0)
+}
+
+fn cross_until_idle(
+    table: &Table,
+    pool: &mut [Order],
+    end: u64,
+    streams: &mut Streams,
+    stop: &(dyn Fn() -> bool + Sync),
+    record: &mut Record<'_, '_>,
+) {
+    if table.m < SMALL {
+        return; // Each tour is an optimum already.
+    }
+    let mut idle = 0;
+    while idle < IDLE_GENERATIONS && pool.len() > 1 && record.made < end && !stop() {
+        pool.shuffle(&mut streams.next());
+        let pairs: Vec<_> = (0..pool.len()).map(|k| (k, streams.next())).collect();
+        let children: Vec<(Option<Order>, u64)> = pairs
+            .into_par_iter()
+            .map(|(k, mut rng)| {
+                if stop() {
+                    return (None, 0);
+                }
+                cross(table, &pool[k], &pool[(k + 1) % pool.len()], &mut rng)
+            })
+            .collect();
+        idle += 1;
+        record.made += 1;
+        for (slot, (child, made)) in pool.iter_mut().zip(children) {
+            record.made += made;
+            if let Some(child) = child {
+                *slot = child;
+                idle = 0;
+            }
+        }
+        record.offer(table.tour(&pool[best_of(pool)]));
+    }
+}
+
+/// The best child of two parents that is better than the first, and how many were tried.
+fn cross(table: &Table, a: &Order, b: &Order, rng: &mut ChaCha8Rng) -> (Option<Order>, u64) {
+    let mut crossover = Crossover::default();
+    let cycles = crossover.prepare(table, a, b, rng);
+    let mut local = LocalSearch::new(table.m);
+    let mut child = a.clone();
+    let mut best: Option<Order> = None;
+    let mut chosen: Vec<usize> = (0..cycles).collect();
+    chosen.shuffle(rng);
+    chosen.truncate(CHILDREN);
+    let made = chosen.len() as u64;
+    for k in chosen {
+        crossover.child(table, b, k, &a.chosen, &mut local, &mut child);
+        if child.cost < best.as_ref().map_or(a.cost, |t| t.cost) {
+            match &mut best {
+                Some(best) => best.copy_from(&child),
+                None => best = Some(child.clone()),
+            }
+        }
+    }
+    if let Some(best) = &mut best {
+        local.layers.whole(table, best);
+    }
+    (best, made)
+}

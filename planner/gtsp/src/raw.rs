@@ -1,0 +1,172 @@
+//! The instance as the search sees it: with a root, disguised jumps told apart, and only as many
+//! blocks as there is room for.
+
+use crate::instance::{Ends, Instance, Jump};
+
+/// An entry that is the largest of all and at least this common is "no arc" in disguise.
+const DISGUISED_JUMPS: f64 = 0.3;
+/// Entries of cost blocks that the search keeps, 4 bytes each.
+const ROOM: usize = 1 << 28;
+/// Neighbours of each cluster whose blocks are kept where all would not fit.
+const KEPT: usize = 24;
+
+/// The instance with its root.
+pub(super) struct Raw<'a> {
+    pub(super) instance: &'a Instance,
+    pub(super) m: usize,
+    pub(super) root: usize,
+    pub(super) disguised: Option<f64>,
+    /// Pairs that are kept where not all of them fit; the search sees the others as jumps.
+    pub(super) kept: Option<Vec<bool>>,
+}
+
+impl Raw<'_> {
+    pub(super) fn size(&self, a: usize) -> usize {
+        self.instance.sizes().get(a).copied().unwrap_or(1)
+    }
+
+    pub(super) fn maybe_adjacent(&self, a: usize, b: usize) -> bool {
+        if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
+            return false;
+        }
+        a >= self.instance.clusters()
+            || b >= self.instance.clusters()
+            || self.instance.adjacent(a, b)
+            || self.enters_root(b)
+    }
+
+    pub(super) fn enters_root(&self, b: usize) -> bool {
+        b == self.root && *self.instance.ends() != Ends::Closed
+    }
+
+    pub(super) fn arc(&self, a: usize, i: usize, b: usize, j: usize) -> Option<f64> {
+        if self.enters_root(b) {
+            return Some(0.0); // the closing arc of an open path
+        }
+        let arc = match self.instance.ends() {
+            Ends::OpenFromCosts(start) if a == self.root => {
+                Some(start[self.instance.node_index(b, j)]).filter(|c| c.is_finite())
+            }
+            _ => self.instance.arc(a, i, b, j),
+        };
+        arc.filter(|c| Some(*c) != self.disguised)
+    }
+
+    pub(super) fn price(&self, a: usize, b: usize) -> f64 {
+        if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
+            return f64::INFINITY; // seen as the dearest of all
+        }
+        if let Some(price) = self.disguised {
+            return price;
+        }
+        if self.enters_root(b) {
+            0.0 // never asked for: that arc always exists
+        } else if a >= self.instance.clusters() {
+            self.instance.start_jump_price()
+        } else {
+            self.instance.jump_price(a, b)
+        }
+    }
+
+    /// Where the blocks would need too much room, keeps those to and from the nearest clusters, by
+    /// a few of their nodes.
+    pub(super) fn keep_what_fits(&mut self) {
+        let entries: usize = self
+            .pairs()
+            .filter(|&(a, b)| self.maybe_adjacent(a, b))
+            .map(|(a, b)| self.size(a) * self.size(b))
+            .sum();
+        // Asymmetric costs are stored both ways.
+        if 2 * entries <= ROOM {
+            return;
+        }
+        let few = |c: usize| (0..self.size(c)).step_by(self.size(c).div_ceil(4));
+        let m = self.m;
+        let mut kept = vec![false; m * m];
+        for a in 0..m {
+            let mut near: Vec<(f64, usize)> = (0..m)
+                .filter(|&b| a != b && self.maybe_adjacent(a, b))
+                .map(|b| {
+                    let arcs = few(a).flat_map(|i| few(b).map(move |j| (i, j)));
+                    let low = arcs
+                        .filter_map(|(i, j)| self.arc(a, i, b, j))
+                        .fold(f64::INFINITY, f64::min);
+                    (low, b)
+                })
+                .collect();
+            near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+            for &(_, b) in near.iter().take(KEPT) {
+                kept[a * m + b] = true;
+                kept[b * m + a] = true;
+            }
+        }
+        for c in 0..m {
+            kept[c * m + self.root] = true;
+            kept[self.root * m + c] = true;
+        }
+        self.kept = Some(kept);
+    }
+
+    pub(super) fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        (0..self.m).flat_map(move |a| (0..self.m).map(move |b| (a, b))).filter(|(a, b)| a != b)
+    }
+
+    pub(super) fn entries(&self, a: usize, b: usize) -> impl Iterator<Item = Option<f64>> + '_ {
+        let adjacent = self.maybe_adjacent(a, b);
+        (0..self.size(a))
+            .flat_map(move |i| (0..self.size(b)).map(move |j| (i, j)))
+            .map(move |(i, j)| if adjacent { self.arc(a, i, b, j) } else { None })
+    }
+}
+
+/// What all costs together say.
+pub(super) struct Statistics {
+    pub(super) largest: f64,
+    pub(super) integers: bool,
+    pub(super) disguised: Option<f64>,
+}
+
+pub(super) fn statistics(raw: &Raw<'_>) -> Statistics {
+    let mut largest = f64::NEG_INFINITY;
+    let mut magnitude: f64 = 0.0;
+    let mut integers = true;
+    let (mut entries, mut at_largest) = (0_u64, 0_u64);
+    for (a, b) in raw.pairs() {
+        if !raw.maybe_adjacent(a, b) || raw.enters_root(b) {
+            continue;
+        }
+        for cost in raw.entries(a, b) {
+            entries += 1;
+            let Some(cost) = cost else { continue };
+            integers &= cost.fract() == 0.0;
+            magnitude = magnitude.max(cost.abs());
+            if cost > largest {
+                (largest, at_largest) = (cost, 0);
+            }
+            at_largest += u64::from(cost == largest);
+        }
+    }
+    let complete = !matches!(raw.instance.jump(), Jump::Table(_));
+    let common = at_largest as f64 >= DISGUISED_JUMPS * entries as f64;
+    if complete && common && largest > 0.0 {
+        // The largest of the rest is the scale of the arcs; without a rest all costs are equal.
+        let rest =
+            raw.pairs().filter(|&(_, b)| !raw.enters_root(b)).flat_map(|(a, b)| raw.entries(a, b));
+        let below = rest
+            .flatten()
+            .filter(|&c| c < largest)
+            .fold(None, |m: Option<f64>, c| Some(m.map_or(c, |m| m.max(c))));
+        let same_price = match raw.instance.jump() {
+            Jump::Uniform(h) => *h == largest || entries_are_finite(raw),
+            _ => entries_are_finite(raw),
+        };
+        if let Some(below) = below.filter(|&below| below > 0.0 && same_price) {
+            return Statistics { largest: below, integers, disguised: Some(largest) };
+        }
+    }
+    Statistics { largest: magnitude, integers, disguised: None }
+}
+
+fn entries_are_finite(raw: &Raw<'_>) -> bool {
+    raw.pairs().all(|(a, b)| raw.maybe_adjacent(a, b) && raw.entries(a, b).all(|e| e.is_some()))
+}

@@ -1,0 +1,285 @@
+//! The solver's front: budget, progress, cancellation, and the rounds of the search.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::bound::lower_bound;
+use crate::exact;
+use crate::instance::Instance;
+use crate::local::LocalSearch;
+use crate::order::Order;
+use crate::pool::{Epoch, evolve};
+use crate::search::{Cooling, SMALL, construct, iterate, settle};
+use crate::table::Table;
+use crate::thin::{Thinned, polish};
+use crate::tour::{Tour, TourCost};
+
+/// Limits on the work.
+///
+/// With trials alone the result depends on (instance, seed, trials) and nothing else. A time limit
+/// cuts the search wherever it then stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Budget {
+    /// Trials (kick, local search, acceptance); rounded up to whole rounds of runs.
+    pub trials: Option<u64>,
+    /// Wall-clock limit.
+    pub time: Option<Duration>,
+    /// Threads; 0: one for every core.
+    pub threads: usize,
+    /// Stop as soon as the total cost is this low.
+    pub target: Option<f64>,
+}
+
+impl Budget {
+    /// A number of trials on all cores: the reproducible kind.
+    pub fn trials(trials: u64) -> Self {
+        Self { trials: Some(trials), time: None, threads: 0, target: None }
+    }
+
+    /// A wall-clock limit on all cores.
+    pub fn time(time: Duration) -> Self {
+        Self { trials: None, time: Some(time), threads: 0, target: None }
+    }
+}
+
+/// State of the search, told whenever the best tour has improved.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress<'a> {
+    /// Best tour so far.
+    pub tour: &'a Tour,
+    /// Its cost.
+    pub cost: TourCost,
+    /// Time since the start.
+    pub elapsed: Duration,
+    /// Trials made.
+    pub trials: u64,
+}
+
+/// The best tour found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// Order of the clusters and the node chosen in each.
+    pub tour: Tour,
+    /// Its cost, recomputed from the instance.
+    pub cost: TourCost,
+    /// Trials made; 0 where the exact method sufficed.
+    pub trials: u64,
+    /// Time spent.
+    pub elapsed: Duration,
+    /// No tour costs less than this.
+    pub lower_bound: Option<f64>,
+}
+
+impl Solution {
+    /// (cost − bound) / |bound|; `None` without a bound, 0 for a proven optimum.
+    pub fn gap(&self) -> Option<f64> {
+        self.lower_bound.map(|bound| {
+            let excess = self.cost.total() - bound;
+            if excess <= 0.0 { 0.0 } else { excess / bound.abs().max(f64::MIN_POSITIVE) }
+        })
+    }
+}
+
+/// Why there is nothing to return.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SolveError {
+    /// Neither trials nor time limit the search.
+    #[error("the budget has no limit: set trials, time or both")]
+    NoLimit,
+    /// The thread pool could not be made.
+    #[error("could not start {threads} threads")]
+    Threads {
+        /// Threads asked for.
+        threads: usize,
+    },
+}
+
+/// Takes the progress; `Break` ends the search.
+pub type Observer<'a> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + Send + 'a;
+
+/// Watches and stops a search from outside.
+#[derive(Default)]
+pub struct Control<'a> {
+    /// Called with every improvement; `Break` ends the search.
+    pub progress: Option<&'a mut Observer<'a>>,
+    /// Set it from any thread: the search ends within milliseconds, the best tour is returned.
+    pub cancel: Option<&'a AtomicBool>,
+    /// A tour of the same instance that the search goes on from; the result is never worse.
+    pub start: Option<&'a Tour>,
+}
+
+/// Best tour found within the budget; the same for the same (instance, seed, trials) whatever the
+/// number of threads.
+pub fn solve(instance: &Instance, budget: &Budget, seed: u64) -> Result<Solution, SolveError> {
+    solve_with(instance, budget, seed, Control::default())
+}
+
+/// [`solve`], watched and cancellable.
+pub fn solve_with(
+    instance: &Instance,
+    budget: &Budget,
+    seed: u64,
+    control: Control<'_>,
+) -> Result<Solution, SolveError> {
+    if budget.trials.is_none() && budget.time.is_none() {
+        return Err(SolveError::NoLimit);
+    }
+    let started = Instant::now();
+    if let Some((tour, cost)) = exact::solve(instance) {
+        let total = cost.total();
+        let solution = Solution {
+            tour,
+            cost,
+            trials: 0,
+            elapsed: started.elapsed(),
+            lower_bound: Some(total),
+        };
+        if let Some(progress) = control.progress {
+            // Nothing is left to be stopped.
+            let _ = progress(&Progress {
+                tour: &solution.tour,
+                cost,
+                elapsed: solution.elapsed,
+                trials: 0,
+            });
+        }
+        return Ok(solution);
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(budget.threads)
+        .build()
+        .map_err(|_| SolveError::Threads { threads: budget.threads })?;
+    Ok(pool.install(|| rounds(instance, budget, seed, control, started)))
+}
+
+/// The search without the exact method; at least one tour is always made.
+pub(super) fn rounds(
+    instance: &Instance,
+    budget: &Budget,
+    seed: u64,
+    control: Control<'_>,
+    started: Instant,
+) -> Solution {
+    let full = Table::new(instance);
+    let mut thinned = Thinned::new(&full);
+    let stopped = AtomicBool::new(false);
+    let cancel = control.cancel;
+    let stop = || {
+        stopped.load(Ordering::Relaxed)
+            || cancel.is_some_and(|c| c.load(Ordering::Relaxed))
+            || budget.time.is_some_and(|t| started.elapsed() >= t)
+    };
+    let mut record = Record {
+        instance,
+        best: None,
+        made: 0,
+        target: budget.target,
+        progress: control.progress,
+        started,
+        stopped: &stopped,
+    };
+    let mut streams = Streams { seed, next: 0 };
+    let limit = budget.trials.unwrap_or(u64::MAX);
+    let mut elite: Vec<Order> = Vec::new();
+    if let Some(start) = control.start.filter(|start| start.check(instance).is_ok()) {
+        elite.push(full.order(start));
+        record.offer(start.clone());
+    }
+    for number in 0.. {
+        let left = limit.saturating_sub(record.made);
+        let epoch = |table: &Table| {
+            let likely = budget.time.map_or(u64::MAX, |time| {
+                let rate = trials_a_second(table, seed) * rayon::current_num_threads() as f64;
+                (rate * time.saturating_sub(started.elapsed()).as_secs_f64()) as u64
+            });
+            Epoch { number, limit: left, likely }
+        };
+        // Every other epoch has all nodes.
+        if let Some(thinned) = thinned.as_mut().filter(|_| number % 2 == 0) {
+            elite.iter().for_each(|tour| thinned.take_up(tour));
+            let table = thinned.table(&full);
+            let mut inside: Vec<Order> =
+                elite.iter().map(|tour| thinned.inside(&table, tour)).collect();
+            evolve(&table, epoch(&table), &mut inside, &mut streams, &stop, &mut record);
+            if !stopped.load(Ordering::Relaxed) {
+                elite.extend(inside.last().map(|winner| polish(&full, &table.tour(winner))));
+                let best = record.best.as_ref().map(|(tour, _)| polish(&full, tour));
+                best.iter().for_each(|best| record.offer(full.tour(best)));
+            }
+        } else {
+            evolve(&full, epoch(&full), &mut elite, &mut streams, &stop, &mut record);
+        }
+        // So few clusters are enumerated: one epoch has the optimum.
+        if record.made >= limit || stop() || full.m < SMALL {
+            break;
+        }
+    }
+    let made = record.made;
+    let (tour, cost) = record.best.expect("every epoch records a tour");
+    let lower_bound = lower_bound(instance);
+    Solution { tour, cost, trials: made, elapsed: started.elapsed(), lower_bound }
+}
+
+/// How fast one thread is, by a few trials on a fresh tour.
+fn trials_a_second(table: &Table, seed: u64) -> f64 {
+    const TRIALS: u64 = 64;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut local = LocalSearch::new(table.m);
+    let mut tour = construct(table, &mut rng);
+    settle(table, &mut local, &mut tour);
+    let cooling = Cooling { trials: TRIALS, from: 0.3, to: 0.03 };
+    let started = Instant::now();
+    iterate(table, &mut local, &mut tour, cooling, &mut rng, &|| false);
+    TRIALS as f64 / started.elapsed().as_secs_f64().max(1e-9)
+}
+
+/// Random streams of one seed, handed out in a fixed order before the threads start.
+pub(super) struct Streams {
+    pub(super) seed: u64,
+    pub(super) next: u64,
+}
+
+impl Streams {
+    /// A generator that no other task shares.
+    pub(super) fn next(&mut self) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(self.next);
+        self.next += 1;
+        rng
+    }
+}
+
+/// Keeps the best tour by its true cost and tells the observer.
+pub(super) struct Record<'a, 'b> {
+    instance: &'a Instance,
+    best: Option<(Tour, TourCost)>,
+    /// Trials made so far.
+    pub(super) made: u64,
+    target: Option<f64>,
+    progress: Option<&'b mut Observer<'b>>,
+    started: Instant,
+    stopped: &'a AtomicBool,
+}
+
+impl Record<'_, '_> {
+    /// Considers a tour of the search.
+    pub(super) fn offer(&mut self, tour: Tour) {
+        let cost = tour.cost(self.instance);
+        if self.best.as_ref().is_some_and(|(_, best)| !cost.better_than(best)) {
+            return;
+        }
+        let mut end = self.target.is_some_and(|t| cost.total() <= t);
+        if let Some(progress) = &mut self.progress {
+            let elapsed = self.started.elapsed();
+            end |= progress(&Progress { tour: &tour, cost, elapsed, trials: self.made }).is_break();
+        }
+        self.best = Some((tour, cost));
+        if end {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Sending a plan to the executor and waiting for what becomes of it.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError};
+use nullsweep_ipc_types::{EventKind, JoinRule, PlanEvent, PlanId, Reason, Telemetry};
+
+use crate::plan::{Plan, PlanError};
+
+/// How a plan joins what is going on, as it is asked for on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Join {
+    /// Stop on the running plan's path, then start.
+    Stop,
+    /// Start after the running plan.
+    After,
+    /// Start in the knot that the plan was made for.
+    Knot,
+}
+
+/// How long to wait.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patience {
+    /// For the executor's admission.
+    pub admission: Duration,
+    /// For the plan's end once it was accepted; `None`: do not wait for it.
+    pub end: Option<Duration>,
+}
+
+/// Why a plan was not published, or came to no good end.
+#[derive(Debug, thiserror::Error)]
+pub enum PublishError {
+    /// The plan cannot go over the wire.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The services cannot be opened, or there is no executor.
+    #[error(transparent)]
+    Ipc(#[from] IpcError),
+    /// A port failed while waiting.
+    #[error("waiting for the executor: {0}")]
+    Port(#[from] PortError),
+    /// `--join knot` for a plan that continues none.
+    #[error(
+        "the plan does not continue another one: make it with `planner plan --continue PLAN@K`, or publish it with --join stop"
+    )]
+    ContinuesNothing,
+    /// `--join knot` while nothing is executed.
+    #[error("the executor executes no plan that could be joined: publish with --join stop")]
+    NothingRuns,
+    /// No telemetry came.
+    #[error("the executor sends no telemetry: is it running?")]
+    NoTelemetry,
+    /// No admission came in time.
+    #[error("the executor did not answer within {0:?}")]
+    NoAdmission(Duration),
+    /// The executor refused it.
+    #[error("rejected: {}", describe(.0))]
+    Rejected(Box<PlanEvent>),
+    /// It did not end in time.
+    #[error("the plan has not ended within {0:?}")]
+    NoEnd(Duration),
+    /// It was ended early.
+    #[error("ended early: {}", describe(.0))]
+    EndedEarly(Box<PlanEvent>),
+}
+
+/// Publishes the plan to `robot`'s executor and waits for its admission and, if asked, its end.
+/// `seen` is called with every event of this plan. Returns the plan's id.
+///
+/// # Errors
+/// No executor, a rejection with its reason, or an early end: see [`PublishError`].
+pub fn publish(
+    plan: &Plan,
+    robot: &str,
+    root: Option<&Path>,
+    join: Join,
+    patience: Patience,
+    seen: &mut dyn FnMut(&PlanEvent),
+) -> Result<PlanId, PublishError> {
+    let (mut header, knots) = plan.message_parts()?;
+    let ipc = Ipc::open(robot, root)?;
+    let events = ipc.event_receiver()?;
+    let mut publisher = ipc.plan_publisher(knots.len())?;
+    header.join_rule = match join {
+        Join::Stop => JoinRule::StopThenStart,
+        Join::After => JoinRule::AfterCurrent,
+        Join::Knot => {
+            let at = plan.continues.as_ref().ok_or(PublishError::ContinuesNothing)?;
+            if !publisher.has_executor() {
+                return Err(IpcError::NoExecutor { robot: robot.into() }.into());
+            }
+            header.join_plan = running(&ipc, patience.admission)?;
+            header.join_knot = at.knot;
+            JoinRule::AtKnot
+        }
+    }
+    .wire();
+    while events.receive()?.is_some() {} // Older plans' events.
+    let id = publisher.publish(&header, &knots)?;
+
+    let mut wait = |limit: Duration, wanted: fn(EventKind) -> bool| {
+        let start = Instant::now();
+        while start.elapsed() < limit {
+            while let Some(event) = events.receive()? {
+                if event.plan == id {
+                    seen(&event);
+                    if EventKind::from_wire(event.kind).is_some_and(wanted) {
+                        return Ok::<_, PublishError>(Some(event));
+                    }
+                }
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        Ok(None)
+    };
+    let is_admission = |k| matches!(k, EventKind::Accepted | EventKind::Rejected);
+    let admission = wait(patience.admission, is_admission)?
+        .ok_or(PublishError::NoAdmission(patience.admission))?;
+    if admission.kind == EventKind::Rejected.wire() {
+        return Err(PublishError::Rejected(Box::new(admission)));
+    }
+    let Some(limit) = patience.end else { return Ok(id) };
+    let is_end = |k| matches!(k, EventKind::Finished | EventKind::Superseded | EventKind::Aborted);
+    let end = wait(limit, is_end)?.ok_or(PublishError::NoEnd(limit))?;
+    if end.kind == EventKind::Finished.wire() {
+        Ok(id)
+    } else {
+        Err(PublishError::EndedEarly(Box::new(end)))
+    }
+}
+
+/// The plan that the executor executes.
+fn running(ipc: &Ipc, patience: Duration) -> Result<PlanId, PublishError> {
+    let telemetry = newest_telemetry(ipc, patience)?;
+    if telemetry.plan.is_some() { Ok(telemetry.plan) } else { Err(PublishError::NothingRuns) }
+}
+
+/// The executor's newest telemetry.
+///
+/// # Errors
+/// [`PublishError::NoTelemetry`] if none came in time.
+pub fn newest_telemetry(ipc: &Ipc, patience: Duration) -> Result<Telemetry, PublishError> {
+    let receiver = ipc.telemetry_receiver()?;
+    let start = Instant::now();
+    while start.elapsed() < patience {
+        if let Some(newest) = receiver.newest()? {
+            return Ok(newest.value);
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    Err(PublishError::NoTelemetry)
+}
+
+/// An event in words, with the joint, knot, value and bound that it names.
+#[must_use]
+pub fn describe(event: &PlanEvent) -> String {
+    let kind = EventKind::from_wire(event.kind).map_or("unknown event", EventKind::text);
+    let mut text = format!("plan {} {kind}", event.plan);
+    if let Some(reason) = Reason::from_wire(event.reason).filter(|r| *r != Reason::None) {
+        text += &format!(": {reason}");
+    }
+    if event.knot != u32::MAX {
+        text += &format!(", knot {}", event.knot);
+    }
+    if event.joint != u32::MAX {
+        text += &format!(", joint {}", event.joint);
+    }
+    if event.kind == EventKind::Accepted.wire() && event.value.is_finite() {
+        text += &format!(" {:.1} ms after its publication", event.value * 1e3);
+    } else if event.value.is_finite() {
+        text += &format!(", value {:.6}", event.value);
+    }
+    if event.bound.is_finite() {
+        text += &format!(", bound {:.6}", event.bound);
+    }
+    text
+}

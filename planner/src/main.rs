@@ -1,5 +1,0 @@
-//! The `planner` binary: one call into the library.
-
-fn main() -> std::process::ExitCode {
-    nullsweep_planner::cli::main(std::env::args_os())
-}

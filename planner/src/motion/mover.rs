@@ -1,0 +1,169 @@
+//! The motions between two tool poses, as the layered search asks for them.
+
+use nalgebra::Point3;
+use nullsweep_robot::JointVector;
+use xxhash_rust::xxh3::xxh3_64_with_seed;
+
+use crate::cost::{self, Cost};
+use crate::motion::layered::{Link, Motion, Moves};
+use crate::motion::transfer;
+use crate::roadmap::{Blocked, Edge, Graph, ToolPath, Track};
+use crate::workcell::{Sample, Workcell};
+
+/// A joint path into a stop.
+#[derive(Clone, Debug)]
+pub struct Leg {
+    /// Joint vectors from where the arm was to the stop's sample. \[rad\] or \[m\]
+    pub joints: Vec<JointVector>,
+    /// For each of them the planned pad centre while the pad is on the surface, root frame. \[m\]
+    pub line: Vec<Option<Point3<f64>>>,
+}
+
+impl Leg {
+    /// Whether it leaves the surface.
+    #[must_use]
+    pub fn is_jump(&self) -> bool {
+        self.line.iter().any(Option::is_none)
+    }
+
+    /// The same way back.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let mut back = self.clone();
+        back.joints.reverse();
+        back.line.reverse();
+        back
+    }
+}
+
+/// Makes motions in a workcell and prices them.
+pub struct Mover<'a, C> {
+    cell: Workcell<'a>,
+    graph: &'a Graph,
+    /// The patch of each stop of the tour.
+    stops: &'a [usize],
+    cost: &'a C,
+    source: JointVector,
+    /// Added to every jump, so that the tool does not leave the surface for a trifle: the cost of
+    /// a quarter turn of one joint after the other.
+    lift: f64,
+    seed: u64,
+}
+
+/// What a jump adds to a tracked motion: each of these joints moves this far. \[rad\]
+const LIFT_JOINTS: usize = 4;
+const LIFT_ANGLE: f64 = 0.8;
+
+/// What a jump adds to its way, for an arm of `dof` joints.
+pub(crate) fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
+    let mut lift = [0.0; nullsweep_robot::MAX_DOF];
+    lift[..LIFT_JOINTS.min(dof)].fill(LIFT_ANGLE);
+    cost.of(&lift)
+}
+
+impl<'a, C: Cost> Mover<'a, C> {
+    /// For a tour over the patches `stops` and an arm that stands at `source` before the first motion.
+    #[must_use]
+    pub fn new(
+        cell: Workcell<'a>,
+        graph: &'a Graph,
+        stops: &'a [usize],
+        cost: &'a C,
+        source: JointVector,
+        seed: u64,
+    ) -> Self {
+        let lift = lift_cost(cost, cell.arm.dof());
+        Self { cell, graph, stops, cost, source, lift, seed }
+    }
+
+    /// The motion along an edge, or `reversed` back, free of collision; `None` where the branch
+    /// cannot be followed, whatever the redundancy parameter does on the way.
+    #[must_use]
+    pub fn along(
+        &self,
+        edge: &Edge,
+        reversed: bool,
+        from: &Sample,
+        to: &Sample,
+    ) -> Option<Motion<Leg>> {
+        let path = self.path(edge, reversed, from, to);
+        let around = || self.cell.detour(&path, &[*from], &[*to]);
+        self.cell.follow(&path, from, to).ok().or_else(around).map(|track| self.leg(track))
+    }
+
+    fn path(&self, edge: &Edge, reversed: bool, from: &Sample, to: &Sample) -> ToolPath {
+        ToolPath::along(edge, reversed, from.heading, to.heading, self.cell.tool.stand_off)
+    }
+
+    fn leg(&self, track: Track) -> Motion<Leg> {
+        let cost = cost::of_path(self.cost, &track.joints);
+        let line = track.line.into_iter().map(Some).collect();
+        Motion { cost, path: Leg { joints: track.joints, line } }
+    }
+
+    /// A seed that depends on the two ends alone, not on when or on which thread it is asked for.
+    fn seed_of(&self, from: &JointVector, to: &JointVector) -> u64 {
+        let mut bytes = Vec::with_capacity(2 * size_of::<JointVector>());
+        for value in from.iter().chain(to) {
+            bytes.extend_from_slice(&value.to_bits().to_le_bytes());
+        }
+        xxh3_64_with_seed(&bytes, self.seed)
+    }
+}
+
+impl<C: Cost> Moves for Mover<'_, C> {
+    type Path = Leg;
+
+    fn link(&self, from: usize, to: usize) -> Link {
+        let (a, b) = (self.stops[from], self.stops[to]);
+        match self.graph.between(a, b) {
+            Some(edge) => Link::Surface { edge, reversed: self.graph.edges[edge].a != a },
+            None => Link::Jump,
+        }
+    }
+
+    fn track(
+        &self,
+        (edge, reversed): (usize, bool),
+        from: &Sample,
+        to: &Sample,
+    ) -> Result<Motion<Leg>, Blocked> {
+        let path = self.path(&self.graph.edges[edge], reversed, from, to);
+        self.cell.follow(&path, from, to).map(|track| self.leg(track))
+    }
+
+    fn around(
+        &self,
+        (edge, reversed): (usize, bool),
+        from: &Sample,
+        to: &Sample,
+    ) -> Option<Motion<Leg>> {
+        self.along(&self.graph.edges[edge], reversed, from, to)
+    }
+
+    fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<Leg>> {
+        let start = from.map_or(self.source, |s| s.q);
+        let joints = transfer::jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
+        let cost = self.lift + cost::of_path(self.cost, &joints);
+        let contact = self.cell.tool.contact_in_tip();
+        let pad = |q: &JointVector| {
+            Point3::from((self.cell.arm.tip_pose(q) * contact).translation.vector)
+        };
+        let mut line = vec![None; joints.len()];
+        if from.is_some() {
+            line[0] = Some(pad(&joints[0]));
+        }
+        if let (Some(last), Some(q)) = (line.last_mut(), joints.last()) {
+            *last = Some(pad(q));
+        }
+        Some(Motion { cost, path: Leg { joints, line } })
+    }
+
+    fn lifts(&self, at: &Sample) -> bool {
+        transfer::lift(self.cell, &at.q).is_some()
+    }
+
+    fn jump_estimate(&self, straight: f64) -> f64 {
+        self.lift + straight
+    }
+}

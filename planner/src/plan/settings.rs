@@ -1,0 +1,38 @@
+//! The choices that a plan is made by, and that its file keeps.
+
+use serde::{Deserialize, Serialize};
+
+/// How the order is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Shortest Euclidean way; the headings follow from it.
+    Tsp,
+    /// A node for each patch and incident edge; distance and turning are weighed (Eq. 4).
+    Curvature,
+    /// A node for each patch, incident edge and sample of the inverse kinematics; the cost of the
+    /// joint motion is weighed (Eq. 1–3) (the paper's Joint-GTSP).
+    Joint,
+}
+
+/// What a plan minimises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CostKind {
+    /// [`Effort`](crate::cost::Effort).
+    Effort,
+    /// [`TaskTime`](crate::cost::TaskTime).
+    Time,
+}
+
+/// How fast a plan goes along its path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Profile {
+    /// Every straight segment as fast as its slowest joint allows: bang-bang velocity, as in the
+    /// paper. Joints change their speed at once, so a real arm lags.
+    #[default]
+    Velocity,
+    /// As fast as velocity and acceleration allow, corners blended.
+    Acceleration,
+}

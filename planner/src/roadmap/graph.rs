@@ -1,0 +1,233 @@
+//! The Euclidean graph over the reachable patches (paper §III.A), with tracked edges.
+
+use std::collections::HashSet;
+
+use nalgebra::Isometry3;
+use nullsweep_surface::patches::Patch;
+use nullsweep_surface::sheet::Surface;
+use rayon::prelude::*;
+
+use super::edge::{Edge, GraphConfig};
+use super::path::ToolPath;
+use crate::progress::Progress;
+use crate::workcell::{Sample, Workcell, contact_pose, direction, middle_out, redundancies};
+
+/// Turns of the pad from the direction of travel that are tried, the paper's own first: the long
+/// side across the travel. \[°\]
+const TURNS: [f64; 6] = [0.0, 30.0, -30.0, 60.0, -60.0, 90.0];
+
+/// The graph. Nodes are indices into the patches it was built from.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    /// The edges that exist, in a fixed order.
+    pub edges: Vec<Edge>,
+    /// For each patch the indices of its edges; empty for unreachable patches.
+    pub incident: Vec<Vec<usize>>,
+    /// The connected components with at least one patch, largest first, patches ascending.
+    pub components: Vec<Vec<usize>>,
+    /// Pairs of neighbours that were tried.
+    pub candidates: usize,
+    /// Those of them (a < b) that no edge joins.
+    apart: HashSet<(usize, usize)>,
+}
+
+impl Graph {
+    /// With these edges over the reached patches.
+    fn of(edges: Vec<Edge>, reached: &[Option<Sample>], apart: Vec<(usize, usize)>) -> Self {
+        let mut incident = vec![Vec::new(); reached.len()];
+        for (i, e) in edges.iter().enumerate() {
+            incident[e.a].push(i);
+            incident[e.b].push(i);
+        }
+        let components = components(&edges, &incident, reached);
+        let candidates = edges.len() + apart.len();
+        Self { edges, incident, components, candidates, apart: apart.into_iter().collect() }
+    }
+
+    /// The edge between two patches.
+    #[must_use]
+    pub fn between(&self, a: usize, b: usize) -> Option<usize> {
+        self.incident.get(a)?.iter().copied().find(|&e| self.edges[e].other(a) == b)
+    }
+
+    /// What was found between two patches, a < b; `None` if they were not tried.
+    fn known(&self, a: usize, b: usize) -> Option<Option<Edge>> {
+        match self.between(a, b) {
+            Some(edge) => Some(Some(self.edges[edge].clone())),
+            None => self.apart.contains(&(a, b)).then_some(None),
+        }
+    }
+}
+
+/// Builds the graph over the patches that `reached` marks: each patch's nearest neighbours
+/// within the radius, in the union of both directions, joined where a surface line exists and
+/// some branch can be followed along it: at one redundancy value, or else with a detour. What
+/// `before` found between the first patches, which must be the same, is taken over.
+#[must_use]
+pub fn build(
+    cell: Workcell<'_>,
+    surface: &Surface,
+    patches: &[Patch],
+    reached: &[Option<Sample>],
+    config: &GraphConfig,
+    before: Option<&Graph>,
+    progress: &dyn Progress,
+) -> Graph {
+    let pairs = neighbour_pairs(patches, reached, config);
+    progress.stage("graph", Some(pairs.len()));
+    let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
+    let tried: Vec<Option<Edge>> = pairs
+        .par_iter()
+        .map(|&(a, b)| {
+            let known = before.and_then(|graph| graph.known(a, b));
+            let edge = known.unwrap_or_else(|| {
+                let edge = Edge::between(surface, patches, a, b, config)?;
+                let mut ways: Vec<Way> =
+                    TURNS.iter().map(|turn| Way::new(cell, patches, &edge, *turn)).collect();
+                let even = ways.iter_mut().position(|way| way.is_followed(cell, &values));
+                let found =
+                    even.or_else(|| ways.iter().position(|way| way.has_detour(cell, &values)))?;
+                Some(ways.swap_remove(found).edge)
+            });
+            progress.tick();
+            edge
+        })
+        .collect();
+    let apart = pairs.iter().zip(&tried).filter(|(_, e)| e.is_none()).map(|(p, _)| *p).collect();
+    Graph::of(tried.into_iter().flatten().collect(), reached, apart)
+}
+
+/// The graph of the paper's model, between whose nodes no arm is followed: each patch's nearest
+/// neighbours joined wherever a surface line leads.
+#[must_use]
+pub fn unchecked(
+    surface: &Surface,
+    patches: &[Patch],
+    reached: &[Option<Sample>],
+    config: &GraphConfig,
+) -> Graph {
+    let (mut edges, mut apart) = (Vec::new(), Vec::new());
+    for (a, b) in neighbour_pairs(patches, reached, config) {
+        match Edge::between(surface, patches, a, b, config) {
+            Some(edge) => edges.push(edge),
+            None => apart.push((a, b)),
+        }
+    }
+    Graph::of(edges, reached, apart)
+}
+
+/// Pairs (a < b) of reachable patches of which one is among the other's nearest.
+fn neighbour_pairs(
+    patches: &[Patch],
+    reached: &[Option<Sample>],
+    config: &GraphConfig,
+) -> Vec<(usize, usize)> {
+    let nodes: Vec<usize> = (0..patches.len()).filter(|&i| reached[i].is_some()).collect();
+    let mut pairs = Vec::new();
+    for &i in &nodes {
+        let mut near: Vec<(f64, usize)> = nodes
+            .iter()
+            .filter(|&&j| j != i)
+            .map(|&j| ((patches[j].centre - patches[i].centre).norm(), j))
+            .filter(|&(d, _)| d <= config.radius && d > 1e-6)
+            .collect();
+        near.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        pairs.extend(near.iter().take(config.neighbours).map(|&(_, j)| (i.min(j), i.max(j))));
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// An edge with the pad turned from it.
+struct Way {
+    edge: Edge,
+    path: ToolPath,
+    /// Contact pose and heading at both ends.
+    ends: [(Isometry3<f64>, f64); 2],
+    /// The samples at its start, as far as they were asked for.
+    from: Vec<Sample>,
+}
+
+impl Way {
+    /// `turn` in \[°\].
+    fn new(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, turn: f64) -> Self {
+        let edge = Edge { turn: turn.to_radians(), ..edge.clone() };
+        let headings = [edge.heading_a + edge.turn, edge.heading_b + edge.turn];
+        let stand_off = cell.tool.stand_off;
+        let path = ToolPath::along(&edge, false, headings[0], headings[1], stand_off);
+        let end = |patch: usize, heading: f64| {
+            let patch = &patches[patch];
+            let travel = direction(&patch.normal, heading);
+            (contact_pose(&patch.centre, &patch.normal, &travel, stand_off), heading)
+        };
+        let ends = [end(edge.a, headings[0]), end(edge.b, headings[1])];
+        Self { edge, path, ends, from: Vec::new() }
+    }
+
+    /// Whether one branch can be followed at one of the redundancy values.
+    fn is_followed(&mut self, cell: Workcell<'_>, values: &[f64]) -> bool {
+        let [(start, first), (end, last)] = &self.ends;
+        let mut to = Vec::new();
+        values.iter().any(|value| {
+            let value = std::slice::from_ref(value);
+            let before = self.from.len();
+            cell.samples(start, *first, value, &mut self.from);
+            let from = &self.from[before..];
+            if from.is_empty() {
+                return false;
+            }
+            to.clear();
+            cell.samples(end, *last, value, &mut to);
+            from.iter().any(|f| {
+                let mut same = to.iter().filter(|t| t.branch == f.branch);
+                same.any(|t| cell.follow(&self.path, f, t).is_ok())
+            })
+        })
+    }
+
+    /// Whether one branch can be followed where none of the values by itself can, going from one
+    /// to another.
+    fn has_detour(&self, cell: Workcell<'_>, values: &[f64]) -> bool {
+        if self.from.is_empty() || values.len() < 2 {
+            return false;
+        }
+        let (end, last) = &self.ends[1];
+        let mut to = Vec::new();
+        cell.samples(end, *last, values, &mut to);
+        cell.detour(&self.path, &self.from, &to).is_some()
+    }
+}
+
+/// Connected components of the reachable patches.
+fn components(
+    edges: &[Edge],
+    incident: &[Vec<usize>],
+    reached: &[Option<Sample>],
+) -> Vec<Vec<usize>> {
+    let mut seen: Vec<bool> = reached.iter().map(Option::is_none).collect();
+    let mut components = Vec::new();
+    for start in 0..reached.len() {
+        if seen[start] {
+            continue;
+        }
+        seen[start] = true;
+        let mut component = vec![start];
+        let mut next = 0;
+        while next < component.len() {
+            let here = component[next];
+            next += 1;
+            for &e in &incident[here] {
+                let other = edges[e].other(here);
+                if !seen[other] {
+                    seen[other] = true;
+                    component.push(other);
+                }
+            }
+        }
+        component.sort_unstable();
+        components.push(component);
+    }
+    components.sort_by_key(|c| (std::cmp::Reverse(c.len()), c[0]));
+    components
+}

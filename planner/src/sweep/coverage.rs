@@ -1,0 +1,40 @@
+//! What the pad has swept: coverage measured on the motion itself, not promised by its graph.
+
+use nalgebra::Isometry3;
+use nullsweep_robot::Tool;
+use nullsweep_surface::grid::Grid;
+use nullsweep_surface::scan::Scan;
+
+/// For each point of the scan whether the pad passes over it: at some pose the point lies in the
+/// pad's rectangle, within `tool.reach_normal` of the plane `tool.stand_off` ahead of the pad, and
+/// its normal is within `tool.reach_angle` of the pad's axis.
+///
+/// `contact_poses` are the contact frame along the dense motion, in the scan's frame; a third of
+/// the pad's width between them is close enough.
+#[must_use]
+pub fn swept(scan: &Scan, contact_poses: &[Isometry3<f64>], tool: &Tool) -> Vec<bool> {
+    let mut swept = vec![false; scan.points.len()];
+    let half_diagonal = 0.5 * tool.width.hypot(tool.length);
+    let reach = half_diagonal.hypot(tool.reach_normal);
+    let grid = Grid::new(&scan.points, 0.5 * reach);
+    let aligned = tool.reach_angle.cos();
+    for pose in contact_poses {
+        let [x, y, z] = [0, 1, 2].map(|axis| pose.rotation * nalgebra::Vector3::ith_axis(axis));
+        let centre = nalgebra::Point3::from(pose.translation.vector + z.scale(tool.stand_off));
+        grid.within(&centre, reach, |index, point, _| {
+            let offset = point - centre;
+            let seen = &mut swept[index as usize];
+            *seen |= offset.dot(&x).abs() <= 0.5 * tool.width
+                && offset.dot(&y).abs() <= 0.5 * tool.length
+                && offset.dot(&z).abs() <= tool.reach_normal
+                && -scan.normals[index as usize].dot(&z) >= aligned;
+        });
+    }
+    swept
+}
+
+/// The share of swept points, 0 to 1; 0 without points.
+#[must_use]
+pub fn share(swept: &[bool]) -> f64 {
+    swept.iter().filter(|s| **s).count() as f64 / swept.len().max(1) as f64
+}

@@ -1,0 +1,4 @@
+//! In which order the patches are visited.
+
+pub mod formulation;
+pub mod joint;

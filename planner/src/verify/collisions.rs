@@ -1,0 +1,67 @@
+//! Collisions along every segment.
+
+use nalgebra::Point3;
+use nullsweep_collision::{ToolContact, World};
+use nullsweep_robot::Arm;
+use rayon::prelude::*;
+
+use super::violation::{Violation, ViolationKind};
+use crate::plan::Plan;
+
+/// Joints move at most this far between two looks at collisions. \[rad\] or \[m\]
+const COLLISION_STEP: f64 = 0.02;
+/// How far the pad is lifted off the surface before it must keep its margin, with some slack. \[m\]
+const LIFT: f64 = 0.052;
+
+/// Exact collision checks along every segment.
+pub(super) fn collisions(
+    plan: &Plan,
+    arm: &Arm,
+    world: &World,
+    tick: &(dyn Fn() + Sync),
+) -> (Vec<Violation>, usize) {
+    let exact = world.exact();
+    let lifts = lifts(plan, arm);
+    let per_segment: Vec<(Option<Violation>, usize)> = (1..plan.knots.len())
+        .into_par_iter()
+        .map(|k| {
+            let curve = plan.curve(k);
+            let steps = curve.steps(COLLISION_STEP);
+            let may_touch = plan.on_surface(k) || lifts[k];
+            let contact = if may_touch { ToolContact::Allowed } else { ToolContact::Forbidden };
+            let hit = (1..=steps).find_map(|s| {
+                let q = curve.at(s as f64 / steps as f64);
+                exact.first_hit(&q, contact).map(|hit| Violation {
+                    knot: k,
+                    kind: ViolationKind::Collision,
+                    detail: hit.to_string(),
+                })
+            });
+            tick();
+            (hit, steps)
+        })
+        .collect();
+    let checks = per_segment.iter().map(|(_, n)| n).sum();
+    (per_segment.into_iter().filter_map(|(hit, _)| hit).collect(), checks)
+}
+
+/// Which segments of transfers, by the knot that ends them, lift the pad off the surface or set it
+/// down: those next to a knot on the surface, or at the plan's start, until the pad's centre is
+/// [`LIFT`] away. There it may still touch.
+fn lifts(plan: &Plan, arm: &Arm) -> Vec<bool> {
+    let contact = plan.tool.contact_in_tip();
+    let centre =
+        |k: usize| Point3::from((arm.tip_pose(&plan.knots[k].q) * contact).translation.vector);
+    let mut lifts = vec![false; plan.knots.len()];
+    let starts_in_contact = |k: usize| plan.knots[k].line.is_some() || k == 0;
+    for k in 0..plan.knots.len() {
+        if starts_in_contact(k) {
+            let near = |other: usize| (centre(other) - centre(k)).norm() <= LIFT;
+            let up = (k + 1..plan.knots.len()).take_while(|&n| !plan.on_surface(n) && near(n));
+            up.for_each(|n| lifts[n] = true);
+            let down = (1..=k).rev().take_while(|&n| !plan.on_surface(n) && near(n - 1));
+            down.for_each(|n| lifts[n] = true);
+        }
+    }
+    lifts
+}

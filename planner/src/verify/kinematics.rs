@@ -1,0 +1,107 @@
+//! Times, limits and rest.
+
+use nullsweep_robot::{Arm, JointVector};
+
+use super::violation::{Violation, ViolationKind};
+use crate::plan::{Curve, Plan, Profile};
+
+/// Time between two samples of a plan with limited acceleration. \[s\]
+const SAMPLE: f64 = 1e-3;
+/// What an acceleration may exceed its limit by, as a share of it.
+const ROUNDING: f64 = 1e-6;
+
+/// Times, finiteness, velocities and soft limits of every segment.
+pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
+    let mut found = Vec::new();
+    let mut report = |knot, kind, detail| found.push(Violation { knot, kind, detail });
+    for (k, knot) in plan.knots.iter().enumerate() {
+        if knot.q.iter().chain(&knot.v).any(|v| !v.is_finite()) {
+            report(k, ViolationKind::NotFinite, format!("{:?}", knot.q));
+        }
+        let before = k.checked_sub(1).map(|b| &plan.knots[b]);
+        let rises = before.map_or(knot.time_ns == 0, |b| knot.time_ns > b.time_ns);
+        if !rises {
+            report(k, ViolationKind::TimeOrder, format!("time {} ns", knot.time_ns));
+            continue;
+        }
+        let curve = before.map(|_| plan.curve(k));
+        let curve = curve.unwrap_or_else(|| Curve::line(&knot.q, &knot.q, 1.0));
+        for (j, name) in arm.joint_names().iter().enumerate() {
+            let limits = &arm.limits()[j];
+            let velocity = curve.top_speed(j);
+            if velocity > limits.velocity * (1.0 + 1e-9) {
+                let detail = format!("{name}: {velocity:.4} of {:.4}", limits.velocity);
+                report(k, ViolationKind::Velocity, detail);
+            }
+            if plan.profile == Profile::Acceleration {
+                let acceleration = curve.top_acceleration(j);
+                if acceleration > limits.acceleration * (1.0 + ROUNDING) {
+                    let detail = format!("{name}: {acceleration:.4} of {:.4}", limits.acceleration);
+                    report(k, ViolationKind::Acceleration, detail);
+                }
+            }
+            let (low, high) = arm.braking_limits(j, velocity);
+            let (lowest, highest) = curve.range(j);
+            if !(lowest >= low && highest <= high) {
+                let detail =
+                    format!("{name}: {lowest:.4} … {highest:.4} outside {low:.4} … {high:.4}");
+                report(k, ViolationKind::SoftLimit, detail);
+            }
+        }
+    }
+    if plan.profile == Profile::Acceleration {
+        let starts = plan.knots.first().filter(|_| plan.continues.is_none()).map(|k| (0, k));
+        let ends = plan.knots.last().map(|k| (plan.knots.len() - 1, k));
+        for (k, knot) in starts.into_iter().chain(ends) {
+            if knot.v != JointVector::default() {
+                report(k, ViolationKind::Acceleration, format!("not at rest: {:?}", knot.v));
+            }
+        }
+        found.extend(sampled(plan, arm));
+    }
+    found
+}
+
+/// Velocity and acceleration of the positions that a controller gets every [`SAMPLE`], by
+/// differences: what bounds on each curve by itself do not see is a step where two curves meet.
+fn sampled(plan: &Plan, arm: &Arm) -> Vec<Violation> {
+    let mut found = Vec::new();
+    let mut last: Vec<JointVector> = Vec::new();
+    let mut k = 1;
+    let end_ns = plan.knots.last().map_or(0, |k| k.time_ns);
+    for time_ns in (0..=end_ns).step_by((SAMPLE * 1e9) as usize) {
+        while k + 1 < plan.knots.len() && plan.knots[k].time_ns < time_ns {
+            k += 1;
+        }
+        let Some(from) = plan.knots.get(k - 1).filter(|_| k < plan.knots.len()) else { break };
+        let curve = plan.curve(k);
+        let now = curve.at((time_ns - from.time_ns) as f64 * 1e-9 / curve.seconds());
+        if let [.., two, one] = last[..] {
+            for (j, name) in arm.joint_names().iter().enumerate() {
+                let limits = &arm.limits()[j];
+                let velocity = (now[j] - one[j]) / SAMPLE;
+                let acceleration = (now[j] - 2.0 * one[j] + two[j]) / (SAMPLE * SAMPLE);
+                let fast = velocity.abs() > limits.velocity * (1.0 + 1e-9);
+                let hard = acceleration.abs() > limits.acceleration * (1.0 + ROUNDING);
+                if fast || hard {
+                    found.push(Violation {
+                        knot: k,
+                        kind: if hard {
+                            ViolationKind::Acceleration
+                        } else {
+                            ViolationKind::Velocity
+                        },
+                        detail: format!(
+                            "{name} at {time_ns} ns: sampled {velocity:.4}, {acceleration:.4}"
+                        ),
+                    });
+                }
+            }
+        }
+        last.push(now);
+        if last.len() > 2 {
+            last.remove(0);
+        }
+    }
+    found
+}

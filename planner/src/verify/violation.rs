@@ -1,0 +1,33 @@
+//! What is wrong with a plan.
+
+use serde::{Deserialize, Serialize};
+
+/// What was found wrong.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Violation {
+    /// The knot in which the offending segment ends.
+    pub knot: usize,
+    /// What is wrong.
+    pub kind: ViolationKind,
+    /// Which joint or which bodies, and by how much.
+    pub detail: String,
+}
+
+/// The kinds of [`Violation`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ViolationKind {
+    /// Knot times do not start at 0 or do not rise.
+    TimeOrder,
+    /// A value is not finite.
+    NotFinite,
+    /// A joint is faster than its limit.
+    Velocity,
+    /// A joint of a plan with limited acceleration speeds up or slows down by more than its limit,
+    /// or is not at rest at the end.
+    Acceleration,
+    /// A joint is outside its soft limits with their braking margin at its velocity.
+    SoftLimit,
+    /// The arm, its tool or the body collides.
+    Collision,
+}

@@ -1,0 +1,11 @@
+//! The arm in its place: what it reaches, and where the robot stands.
+
+mod contact;
+mod reach;
+mod sample;
+pub mod stance;
+
+pub use contact::{contact_pose, direction, heading_of, tangents};
+pub use reach::reach;
+pub use sample::{Sample, Workcell, middle_out, redundancies};
+pub use stance::{Stance, StanceSearch};
