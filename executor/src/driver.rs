@@ -11,7 +11,6 @@ use nullsweep_ipc_types::{
     bucket_upper_ns,
 };
 
-use crate::MAX_DOF;
 use crate::admit::{Held, ValidPlan};
 use crate::cycle::{Ask, HELD_MOVED, Input, Measured, State, Target, step};
 use crate::guard::Guard;
@@ -19,6 +18,7 @@ use crate::hardware::Hardware;
 use crate::record::Tape;
 use crate::rt::Wake;
 use crate::slots::{Report, Slots};
+use crate::{JointVector, MAX_DOF};
 
 /// Setpoints whose round trip is told.
 const MADE: usize = 64;
@@ -289,7 +289,7 @@ pub(crate) fn widen(q: &[f64; MAX_DOF]) -> [f64; MAX_JOINTS] {
 }
 
 fn measured(states: &JointStates) -> Measured {
-    let mut q = [0.0; MAX_DOF];
+    let mut q = JointVector::ZERO;
     q.copy_from_slice(&states.positions[..MAX_DOF]);
     Measured {
         stamp_ns: states.stamp_ns,
@@ -343,7 +343,7 @@ mod tests {
                 stamp_ns: 1,
                 ..JointStates::zeroed()
             };
-            states.positions[..MAX_DOF].copy_from_slice(&HOME);
+            states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
             let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
             let mut run = |cycles: std::ops::Range<u64>, torso: f64| {
                 for cycle in cycles {
@@ -380,7 +380,7 @@ mod tests {
                 stamp_ns: 1,
                 ..JointStates::zeroed()
             };
-            states.positions[..MAX_DOF].copy_from_slice(&HOME);
+            states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
             let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
             let (mut seen, mut replies) = (Vec::new(), Vec::new());
             for cycle in 1..1100 {

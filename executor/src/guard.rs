@@ -5,9 +5,6 @@ use core::f64::consts::TAU;
 
 use nullsweep_robot::{JointLimits, JointVector, MAX_DOF};
 
-/// One value for each joint of the arm, chain order, unused entries 0. \[rad\] or \[m\]
-pub type Joints = JointVector;
-
 /// What one joint may do, as the robot crate reads it from the URDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointGuard {
@@ -145,7 +142,7 @@ impl Guard {
     ///
     /// # Errors
     /// That joint and its difference. \[rad/s\]
-    pub fn matches_velocity(&self, a: &Joints, b: &Joints) -> Result<(), (usize, f64)> {
+    pub fn matches_velocity(&self, a: &JointVector, b: &JointVector) -> Result<(), (usize, f64)> {
         let bound = self.velocity_tolerance();
         for j in 0..self.used().len() {
             let step = (b[j] - a[j]).abs();
@@ -158,7 +155,12 @@ impl Guard {
 
     /// The joint that is further than `tolerance` from `from`, the farthest one, and by how much.
     #[must_use]
-    pub fn farthest(&self, from: &Joints, to: &Joints, tolerance: f64) -> Option<(usize, f64)> {
+    pub fn farthest(
+        &self,
+        from: &JointVector,
+        to: &JointVector,
+        tolerance: f64,
+    ) -> Option<(usize, f64)> {
         let mut worst: Option<(usize, f64)> = None;
         for (j, guard) in self.used().iter().enumerate() {
             let apart = guard.difference(from[j], to[j]).abs();
@@ -191,8 +193,8 @@ pub(crate) mod tests {
         assert!((guard.joints[4].difference(3.0, -3.0) - 0.283_185_307).abs() < 1e-8);
         assert!((guard.joints[4].difference(-9.0, -9.0 + 10.0 * TAU)).abs() < 1e-12);
         assert_eq!(guard.joints[0].difference(3.0, -3.0), -6.0);
-        let mut to = [0.0; MAX_DOF];
+        let mut to = JointVector::ZERO;
         to[5] = f64::NAN;
-        assert_eq!(guard.farthest(&[0.0; MAX_DOF], &to, 0.1).map(|(j, _)| j), Some(5));
+        assert_eq!(guard.farthest(&JointVector::ZERO, &to, 0.1).map(|(j, _)| j), Some(5));
     }
 }

@@ -3,11 +3,10 @@
 //! Everything is evaluated in closed form from absolute plan time, so nothing drifts, and both
 //! ends of a segment are hit to the bit.
 
-use crate::MAX_DOF;
 use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::Interpolation;
 
-use crate::Joints;
+use crate::{JointVector, MAX_DOF};
 
 /// A knot as the loop reads it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -16,9 +15,9 @@ pub struct PlanKnot {
     /// Time since the plan's start, a whole number, exact to 2^53. \[ns\]
     pub time: f64,
     /// Joint positions. \[rad\] or \[m\]
-    pub q: Joints,
+    pub q: JointVector,
     /// Joint velocities, used by cubic segments. \[rad/s\] or \[m/s\]
-    pub v: Joints,
+    pub v: JointVector,
     /// The steepest change of the plan-time rate that keeps every joint within the stop
     /// acceleration from this knot to a cycle past the next one. \[1/s\]
     pub ramp: f64,
@@ -28,9 +27,9 @@ pub struct PlanKnot {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// \[rad\] or \[m\]
-    pub q: Joints,
+    pub q: JointVector,
     /// \[rad/s\] or \[m/s\]
-    pub v: Joints,
+    pub v: JointVector,
 }
 
 /// The sample of the segment `a`…`b` at plan time `time`, clamped to the segment. \[ns\]
@@ -58,7 +57,7 @@ pub fn sample(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, time: f64) -> Sam
             }
         }
     }
-    Sample { q, v: velocity_at(a, b, kind, u) }
+    Sample { q: JointVector::new(q), v: velocity_at(a, b, kind, u) }
 }
 
 /// The greatest speed of joint `j` within the segment. \[rad/s\]
@@ -124,7 +123,7 @@ fn seconds(a: &PlanKnot, b: &PlanKnot) -> f64 {
     (b.time - a.time) * 1e-9
 }
 
-fn velocity_at(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, u: f64) -> Joints {
+fn velocity_at(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, u: f64) -> JointVector {
     let mut v = [0.0; MAX_DOF];
     for j in 0..MAX_DOF {
         v[j] = match kind {
@@ -134,7 +133,7 @@ fn velocity_at(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, u: f64) -> Joint
             Interpolation::Cubic => Cubic::new(a, b, j).slope(u) / seconds(a, b),
         };
     }
-    v
+    JointVector::new(v)
 }
 
 #[cfg(test)]
@@ -144,7 +143,12 @@ mod tests {
     use super::*;
 
     fn knot(time: f64, q: f64, v: f64) -> PlanKnot {
-        PlanKnot { time, q: [q; MAX_DOF], v: [v; MAX_DOF], ramp: 1.0 }
+        PlanKnot {
+            time,
+            q: JointVector::new([q; MAX_DOF]),
+            v: JointVector::new([v; MAX_DOF]),
+            ramp: 1.0,
+        }
     }
 
     proptest! {

@@ -3,12 +3,10 @@
 
 use std::sync::Arc;
 
-use crate::MAX_DOF;
-
-use crate::Joints;
 use crate::admit::ValidPlan;
 use crate::guard::Guard;
 use crate::interpolate::{PlanKnot, Sample, sample};
+use crate::{JointVector, MAX_DOF};
 
 /// Cycles after which a predicted stop is given up: the slowest ramp takes 1,000 at 1 kHz.
 const PREDICTION_CYCLES: usize = 20_000;
@@ -28,7 +26,7 @@ pub struct Progress {
 pub struct Path {
     plan: Arc<ValidPlan>,
     /// Whole turns added to the plan's continuous joints. \[rad\]
-    shift: Joints,
+    shift: JointVector,
     connector: Connector,
     progress: Progress,
 }
@@ -36,7 +34,7 @@ pub struct Path {
 impl Path {
     /// The plan from its first knot, reached by a connector from `from`, where the arm holds.
     #[must_use]
-    pub fn start(plan: Arc<ValidPlan>, from: &Joints, rate: f64, guard: &Guard) -> Self {
+    pub fn start(plan: Arc<ValidPlan>, from: &JointVector, rate: f64, guard: &Guard) -> Self {
         let shift = shift(&plan, from, guard);
         let first = plan.knots().first().map_or(*from, |k| shifted(&k.q, &shift));
         let connector = Connector::new(from, &first, guard);
@@ -47,7 +45,13 @@ impl Path {
     /// The plan entered at its first knot at full motion, `time` past it. `at` is the first
     /// knot's place as the plan before it has it. \[ns\]
     #[must_use]
-    pub fn join(plan: Arc<ValidPlan>, at: &Joints, time: f64, rate: f64, guard: &Guard) -> Self {
+    pub fn join(
+        plan: Arc<ValidPlan>,
+        at: &JointVector,
+        time: f64,
+        rate: f64,
+        guard: &Guard,
+    ) -> Self {
         let shift = shift(&plan, at, guard);
         let progress = Progress { time: 0.0, rate, segment: 0 };
         let mut path = Self { plan, shift, connector: Connector::none(at), progress };
@@ -99,7 +103,7 @@ impl Path {
     /// Where a stop that begins with the next cycle ends; `None` where no end is in sight. The
     /// same arithmetic as [`Self::advance`], so the arm stops there to the bit.
     #[must_use]
-    pub fn predict_stop(&self, guard: &Guard) -> Option<Joints> {
+    pub fn predict_stop(&self, guard: &Guard) -> Option<JointVector> {
         let mut progress = self.progress;
         for _ in 0..PREDICTION_CYCLES {
             if progress.rate <= 0.0 || progress.time >= self.plan.duration() {
@@ -127,7 +131,7 @@ impl Path {
 
     /// The last knot's place in this path.
     #[must_use]
-    pub fn end(&self) -> Joints {
+    pub fn end(&self) -> JointVector {
         self.plan.knots().last().map_or(self.connector.to, |k| shifted(&k.q, &self.shift))
     }
 
@@ -169,11 +173,11 @@ impl Path {
         }
         let knots = self.plan.knots();
         let (Some(a), Some(b)) = (knots.get(at.segment), knots.get(at.segment + 1)) else {
-            return Sample { q: self.connector.to, v: [0.0; MAX_DOF] };
+            return Sample { q: self.connector.to, v: JointVector::ZERO };
         };
         let mut s = sample(a, b, self.plan.interpolation(), at.time);
         s.q = shifted(&s.q, &self.shift);
-        s.v = s.v.map(|v| v * at.rate);
+        s.v = JointVector::new(s.v.map(|v| v * at.rate));
         s
     }
 }
@@ -182,8 +186,8 @@ impl Path {
 /// trapezoid of speed shared by all joints. Some 50 operations, so it is made where it is needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Connector {
-    from: Joints,
-    to: Joints,
+    from: JointVector,
+    to: JointVector,
     /// \[ns\]
     duration: f64,
     /// Time of speeding up, and of slowing down. \[s\]
@@ -195,11 +199,11 @@ struct Connector {
 }
 
 impl Connector {
-    fn none(at: &Joints) -> Self {
+    fn none(at: &JointVector) -> Self {
         Self { from: *at, to: *at, duration: 0.0, rise: 0.0, acceleration: 0.0, ramp: 50.0 }
     }
 
-    fn new(from: &Joints, to: &Joints, guard: &Guard) -> Self {
+    fn new(from: &JointVector, to: &JointVector, guard: &Guard) -> Self {
         let mut way = 0.0f64;
         let (mut speed, mut acceleration) = (f64::INFINITY, f64::INFINITY);
         for (j, bound) in guard.used().iter().enumerate() {
@@ -239,7 +243,7 @@ impl Connector {
             let left = total - t;
             (1.0 - 0.5 * a * left * left, a * left)
         };
-        let mut s = Sample { q: self.to, v: [0.0; MAX_DOF] };
+        let mut s = Sample { q: self.to, v: JointVector::ZERO };
         for j in 0..MAX_DOF {
             let d = self.to[j] - self.from[j];
             s.q[j] = self.from[j] + d * share.clamp(0.0, 1.0);
@@ -249,17 +253,17 @@ impl Connector {
     }
 }
 
-fn shift(plan: &ValidPlan, reference: &Joints, guard: &Guard) -> Joints {
+fn shift(plan: &ValidPlan, reference: &JointVector, guard: &Guard) -> JointVector {
     let mut shift = [0.0; MAX_DOF];
     if let Some(first) = plan.knots().first() {
         for (j, bound) in guard.used().iter().enumerate() {
             shift[j] = bound.turns(reference[j], first.q[j]);
         }
     }
-    shift
+    JointVector::new(shift)
 }
 
-fn shifted(q: &Joints, shift: &Joints) -> Joints {
+fn shifted(q: &JointVector, shift: &JointVector) -> JointVector {
     let mut sum = *q;
     for j in 0..MAX_DOF {
         sum[j] += shift[j];
@@ -280,7 +284,7 @@ mod tests {
     const DOF: usize = 7;
 
     /// How long the best motion between two stand-stills takes by Ruckig. \[s\]
-    fn best(from: &Joints, to: &Joints, guard: &Guard, together: Synchronization) -> f64 {
+    fn best(from: &JointVector, to: &JointVector, guard: &Guard, together: Synchronization) -> f64 {
         let mut input = InputParameter::<DOF>::new(None);
         let each = |f: &dyn Fn(usize) -> f64| DataArrayOrVec::Stack(std::array::from_fn(f));
         input.current_position = each(&|j| from[j]);
@@ -307,7 +311,7 @@ mod tests {
         ) {
             let mut guard = pr2();
             guard.joints[weak].limits.acceleration *= share;
-            let from = [0.1; MAX_DOF];
+            let from = JointVector::new([0.1; MAX_DOF]);
             let reach = if far { 1.0 } else { guard.start_tolerance };
             let mut to = from;
             for j in 0..DOF {

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::cycle::Order;
 use crate::guard::tests::pr2;
 use crate::testing::{HOME, MS, Sim, cubic, joining, plan};
-use crate::{Guard, Joints, ValidPlan};
+use crate::{Guard, JointVector, ValidPlan};
 /// Swaps of the short form, and of the long one that is run by hand.
 const SHORT: u32 = 20_000;
 const LONG: u32 = 1_000_000;
@@ -32,7 +32,7 @@ impl Dice {
 }
 
 /// Some knots near HOME from `from`, within limits.
-fn walk(dice: &mut Dice, from: Joints) -> Vec<(u64, Joints)> {
+fn walk(dice: &mut Dice, from: JointVector) -> Vec<(u64, JointVector)> {
     let mut points = vec![(0, from)];
     let (mut time, mut q) = (0, from);
     for _ in 0..=dice.below(12) {
@@ -86,7 +86,7 @@ fn random_plan(
 }
 
 /// Twice the time, so that curves through the same points stay below every limit.
-fn slower(mut points: Vec<(u64, Joints)>) -> Vec<(u64, Joints)> {
+fn slower(mut points: Vec<(u64, JointVector)>) -> Vec<(u64, JointVector)> {
     for (time, _) in &mut points {
         *time *= 2;
     }

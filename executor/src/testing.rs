@@ -13,13 +13,13 @@ use nullsweep_ipc_types::{
 use crate::admit::{Held, Rules, ValidPlan, admit};
 use crate::cycle::{Ask, Event, Input, Measured, Order, Output, Reply, State, step};
 use crate::guard::Guard;
-use crate::{Joints, MAX_DOF};
+use crate::{JointVector, MAX_DOF};
 
 pub(crate) const MS: u64 = 1_000_000;
 pub(crate) const FINGERPRINT: u64 = 0xfeed;
 
 /// Where the virtual arm starts: inside every margin.
-pub(crate) const HOME: Joints = [-0.5, 0.3, -1.0, -1.2, 0.4, -1.0, 0.2, 0.0];
+pub(crate) const HOME: JointVector = JointVector::new([-0.5, 0.3, -1.0, -1.2, 0.4, -1.0, 0.2, 0.0]);
 
 pub(crate) fn rules(guard: &Guard) -> Rules {
     Rules {
@@ -39,13 +39,13 @@ pub(crate) fn held() -> Held {
 }
 
 /// A sealed message that passes admission: knots of (time, positions).
-pub(crate) fn message(number: u64, points: &[(u64, Joints)]) -> (PlanHeader, Vec<Knot>) {
+pub(crate) fn message(number: u64, points: &[(u64, JointVector)]) -> (PlanHeader, Vec<Knot>) {
     let knots: Vec<Knot> = points
         .iter()
         .map(|(time, q)| {
             let mut knot = Knot::zeroed();
             knot.time_from_start_ns = *time;
-            knot.positions[..MAX_DOF].copy_from_slice(q);
+            knot.positions[..MAX_DOF].copy_from_slice(&q[..]);
             knot
         })
         .collect();
@@ -69,7 +69,7 @@ pub(crate) fn seal(header: &mut PlanHeader, knots: &[Knot]) {
 pub(crate) fn plan_with(
     guard: &Guard,
     number: u64,
-    points: &[(u64, Joints)],
+    points: &[(u64, JointVector)],
     edit: impl FnOnce(&mut PlanHeader, &mut Vec<Knot>),
 ) -> Arc<ValidPlan> {
     let (mut header, mut knots) = message(number, points);
@@ -86,7 +86,7 @@ pub(crate) fn plan(
     guard: &Guard,
     number: u64,
     rule: JoinRule,
-    points: &[(u64, Joints)],
+    points: &[(u64, JointVector)],
 ) -> Arc<ValidPlan> {
     plan_with(guard, number, points, |h, _| h.join_rule = rule.wire())
 }
@@ -94,7 +94,7 @@ pub(crate) fn plan(
 pub(crate) fn joining(
     guard: &Guard,
     number: u64,
-    points: &[(u64, Joints)],
+    points: &[(u64, JointVector)],
     joined: PlanId,
     knot: usize,
 ) -> Arc<ValidPlan> {
@@ -106,7 +106,7 @@ pub(crate) fn joining(
 }
 
 /// A cubic plan from the same points, at rest at both ends and with central differences between.
-pub(crate) fn cubic(guard: &Guard, number: u64, points: &[(u64, Joints)]) -> Arc<ValidPlan> {
+pub(crate) fn cubic(guard: &Guard, number: u64, points: &[(u64, JointVector)]) -> Arc<ValidPlan> {
     plan_with(guard, number, points, |h, knots| {
         h.interpolation = Interpolation::Cubic.wire();
         for i in 1..knots.len().saturating_sub(1) {
@@ -120,7 +120,7 @@ pub(crate) fn cubic(guard: &Guard, number: u64, points: &[(u64, Joints)]) -> Arc
 }
 
 /// `q` with joint `j` moved by `by`.
-pub(crate) fn moved(mut q: Joints, j: usize, by: f64) -> Joints {
+pub(crate) fn moved(mut q: JointVector, j: usize, by: f64) -> JointVector {
     q[j] += by;
     q
 }
@@ -140,7 +140,7 @@ pub(crate) struct Sim {
     pub guard: Guard,
     pub state: State,
     pub now: u64,
-    pub arm: Joints,
+    pub arm: JointVector,
     pub status: u32,
     /// Whether the endpoint sends states.
     pub speaks: bool,
@@ -148,11 +148,11 @@ pub(crate) struct Sim {
     pub lives: HashMap<PlanId, Life>,
     /// How many events of each kind.
     pub tally: [u64; 6],
-    pub last: Option<Joints>,
-    pub last_v: Joints,
+    pub last: Option<JointVector>,
+    pub last_v: JointVector,
     /// Greatest change of commanded velocity, as an acceleration. \[rad/s²\]
     pub top_acceleration: f64,
-    pipe: [(u64, Joints); 2],
+    pipe: [(u64, JointVector); 2],
     tickets: u64,
 }
 
@@ -169,7 +169,7 @@ impl Sim {
             lives: HashMap::new(),
             tally: [0; 6],
             last: None,
-            last_v: [0.0; MAX_DOF],
+            last_v: JointVector::ZERO,
             top_acceleration: 0.0,
             pipe: [(0, HOME); 2],
             tickets: 0,

@@ -215,7 +215,7 @@ fn a_plan_from_publication_to_its_end() {
     let events = system.ipc.event_receiver().unwrap();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();
     let mut home = [0.0; 16];
-    home[..8].copy_from_slice(&system.arm.home());
+    home[..8].copy_from_slice(&system.arm.home()[..]);
     let (header, knots) = system.line(home, 0.2, 0.5);
 
     let wrong = PlanHeader { fingerprint: 1, ..header };
@@ -259,7 +259,7 @@ fn commands_are_answered_and_obeyed() {
     let client = system.client();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();
     let mut home = [0.0; 16];
-    home[..8].copy_from_slice(&system.arm.home());
+    home[..8].copy_from_slice(&system.arm.home()[..]);
     let (header, knots) = system.line(home, 0.3, 3.0);
     let id = publisher.publish(&header, &knots).unwrap();
     assert_eq!(next(&events, id).0, EventKind::Accepted);
@@ -291,7 +291,7 @@ fn a_plan_that_runs_at_shutdown_is_stopped_and_told() {
     let events = system.ipc.event_receiver().unwrap();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();
     let mut home = [0.0; 16];
-    home[..8].copy_from_slice(&system.arm.home());
+    home[..8].copy_from_slice(&system.arm.home()[..]);
     let (header, knots) = system.line(home, 0.4, 4.0);
     let id = publisher.publish(&header, &knots).unwrap();
     assert_eq!(next(&events, id).0, EventKind::Accepted);
@@ -334,7 +334,7 @@ fn a_killed_run_replays_bit_for_bit() {
     let client = system.client();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();
     let mut home = [0.0; 16];
-    home[..8].copy_from_slice(&system.arm.home());
+    home[..8].copy_from_slice(&system.arm.home()[..]);
     let (header, knots) = system.line(home, 0.2, 0.5);
     let second = Duration::from_secs(1);
     let first = publisher.publish(&header, &knots).unwrap();
@@ -389,7 +389,7 @@ fn commands_are_answered_while_a_large_plan_is_admitted() {
     let client = system.client();
     let mut publisher = system.ipc.plan_publisher(MAX_KNOTS).unwrap();
     let mut home = [0.0; 16];
-    home[..8].copy_from_slice(&system.arm.home());
+    home[..8].copy_from_slice(&system.arm.home()[..]);
     let (header, short) = system.line(home, 0.0, 1.0);
     let knots: Vec<Knot> = (0..MAX_KNOTS as u64)
         .map(|i| Knot { time_from_start_ns: i * 1_000_000, ..short[0] })
@@ -425,7 +425,7 @@ fn a_million_armed_cycles_with_swaps() {
     let telemetry = system.ipc.telemetry_receiver().unwrap();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();
     let mut home = [0.0; 16];
-    home[..8].copy_from_slice(&system.arm.home());
+    home[..8].copy_from_slice(&system.arm.home()[..]);
     let (mut running, mut last) = (PlanId::NONE, Vec::new());
     let mut swaps = 0u64;
     let mut cycle = 0;

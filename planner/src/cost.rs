@@ -19,7 +19,7 @@ pub trait Cost: Send + Sync {
     fn of_eight(&self, displacement: &[f32x8; MAX_DOF]) -> f32x8 {
         let lanes = displacement.map(f32x8::to_array);
         f32x8::from(std::array::from_fn(|k| {
-            self.of(&std::array::from_fn(|j| f64::from(lanes[j][k]))) as f32
+            self.of(&JointVector::from_fn(|j| f64::from(lanes[j][k]))) as f32
         }))
     }
 }
@@ -52,7 +52,8 @@ impl TaskTime {
     /// With the given velocity of each joint. \[rad/s\] or \[m/s\]
     #[must_use]
     pub fn new(velocity: &JointVector) -> Self {
-        Self { seconds_per_unit: velocity.map(|v| if v > 0.0 { 1.0 / v } else { 0.0 }) }
+        let slowness = |j: usize| if velocity[j] > 0.0 { 1.0 / velocity[j] } else { 0.0 };
+        Self { seconds_per_unit: JointVector::from_fn(slowness) }
     }
 }
 
@@ -76,23 +77,6 @@ impl Cost for TaskTime {
     }
 }
 
-/// A weighted sum of two costs.
-#[derive(Clone, Copy, Debug)]
-pub struct Weighted<A, B>(pub f64, pub A, pub f64, pub B);
-
-impl<A: Cost, B: Cost> Cost for Weighted<A, B> {
-    #[inline]
-    fn of(&self, displacement: &JointVector) -> f64 {
-        self.0 * self.1.of(displacement) + self.2 * self.3.of(displacement)
-    }
-
-    #[inline]
-    fn of_eight(&self, displacement: &[f32x8; MAX_DOF]) -> f32x8 {
-        self.1.of_eight(displacement) * self.0 as f32
-            + self.3.of_eight(displacement) * self.2 as f32
-    }
-}
-
 /// The velocity of each joint: the robot's limits, or one `v_max` for all where that is lower
 /// or where it is asked for. Unused lanes are 0. \[rad/s\] or \[m/s\]
 #[must_use]
@@ -101,26 +85,13 @@ pub fn velocities(arm: &Arm, v_max: Option<f64>) -> JointVector {
     for (v, limits) in velocity.iter_mut().zip(arm.limits()) {
         *v = v_max.map_or(limits.velocity, |cap| cap.min(limits.velocity));
     }
-    velocity
-}
-
-/// Absolute joint displacements from `a` to `b`, continuous joints the short way round.
-#[must_use]
-#[inline]
-pub fn displacement(continuous: &[bool; MAX_DOF], a: &JointVector, b: &JointVector) -> JointVector {
-    let mut d = [0.0; MAX_DOF];
-    for j in 0..MAX_DOF {
-        let raw = b[j] - a[j];
-        let turns = if continuous[j] { (raw / std::f64::consts::TAU).round() } else { 0.0 };
-        d[j] = (raw - turns * std::f64::consts::TAU).abs();
-    }
-    d
+    JointVector::new(velocity)
 }
 
 /// The cost of a polyline of joint vectors.
 #[must_use]
 pub fn of_path<C: Cost>(cost: &C, path: &[JointVector]) -> f64 {
-    path.windows(2).map(|w| cost.of(&std::array::from_fn(|j| (w[1][j] - w[0][j]).abs()))).sum()
+    path.windows(2).map(|w| cost.of(&w[0].displacement(&w[1]))).sum()
 }
 
 #[cfg(test)]
@@ -140,17 +111,16 @@ mod tests {
         let at = |j: usize, k: usize| (1.7 * (j * 8 + k) as f64).sin().abs();
         let lanes = std::array::from_fn(|j| f32x8::from(std::array::from_fn(|k| at(j, k) as f32)));
         for (k, found) in cost.of_eight(&lanes).to_array().into_iter().enumerate() {
-            let expected = cost.of(&std::array::from_fn(|j| at(j, k)));
+            let expected = cost.of(&JointVector::from_fn(|j| at(j, k)));
             assert!((f64::from(found) - expected).abs() < 1e-5, "{k}: {found} {expected}");
         }
     }
 
     #[test]
     fn eight_motions_cost_what_each_of_them_does() {
-        let velocity = [2.0, 1.0, 0.5, 3.0, 2.0, 2.0, 1.5, 0.0];
+        let velocity = JointVector::new([2.0, 1.0, 0.5, 3.0, 2.0, 2.0, 1.5, 0.0]);
         check(&Effort);
         check(&TaskTime::new(&velocity));
-        check(&Weighted(0.3, Effort, 2.0, TaskTime::new(&velocity)));
         check(&Squares);
     }
 }

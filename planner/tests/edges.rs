@@ -154,7 +154,7 @@ fn check(s: &Setting, track: &Track, from: &Sample, to: &Sample) {
         let along = line[k] - line[k - 1];
         for step in 0..=8 {
             let t = f64::from(step) / 8.0;
-            let q: JointVector = std::array::from_fn(|j| a[j] + t * (b[j] - a[j]));
+            let q: JointVector = JointVector::from_fn(|j| a[j] + t * (b[j] - a[j]));
             if let Some(hit) = exact.first_hit(&q, ToolContact::Allowed) {
                 panic!("between joint vectors {} and {k}: {hit}", k - 1);
             }

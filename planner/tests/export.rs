@@ -2,13 +2,13 @@
 
 use nullsweep_planner::plan::export::{Format, write};
 use nullsweep_planner::plan::{CostKind, FORMAT, Method, Plan, PlanKnot, Profile};
-use nullsweep_robot::Tool;
+use nullsweep_robot::{JointVector, Tool};
 
 fn plan(profile: Profile) -> Plan {
     let knot = |time_ns, q: f64, v: f64| PlanKnot {
         time_ns,
-        q: [q, -1e-9, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        v: [v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        q: JointVector::new([q, -1e-9, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        v: JointVector::new([v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
         line: Some([0.0; 3]),
         patch: (time_ns > 0).then_some(3),
     };

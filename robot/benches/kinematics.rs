@@ -21,7 +21,7 @@ fn pr2() -> Arm {
 fn configurations(arm: &Arm) -> Vec<JointVector> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut one = || {
-        let mut q = [0.0; 8];
+        let mut q = JointVector::ZERO;
         for (q, l) in q.iter_mut().zip(arm.limits()) {
             *q = rng.random_range(l.lower.max(-3.0)..l.upper.min(3.0));
         }

@@ -128,8 +128,8 @@ fn move_along(
 
 /// Sines and cosines of half of each joint value.
 struct HalfSines {
-    sin: JointVector,
-    cos: JointVector,
+    sin: [f64; MAX_DOF],
+    cos: [f64; MAX_DOF],
 }
 
 impl HalfSines {
@@ -141,7 +141,7 @@ impl HalfSines {
 
 #[inline]
 fn half_sines(q: &JointVector) -> HalfSines {
-    let [a, b, c, d, e, f, g, h] = *q;
+    let [a, b, c, d, e, f, g, h] = **q;
     let (s0, c0) = (f64x4::new([a, b, c, d]) * 0.5).sin_cos();
     let (s1, c1) = (f64x4::new([e, f, g, h]) * 0.5).sin_cos();
     let join = |one: f64x4, two: f64x4| {

@@ -31,7 +31,7 @@ mod urdf;
 
 pub use arm::{Arm, ArmError, ArmSpec, HeldJoint, Jacobian};
 pub use ik::{Branch, InverseKinematics, RedundantJoint, Solution, Solutions};
-pub use joints::wrap;
+pub use joints::{Continuous, JointVector, MAX_DOF, wrap};
 pub use limits::{JointLimits, LimitsError};
 pub use pr2::Side;
 pub use tool::Tool;
@@ -39,10 +39,3 @@ pub use urdf::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, Robot, SafetyController,
     UrdfError,
 };
-
-/// The largest number of active joints in an arm.
-pub const MAX_DOF: usize = 8;
-
-/// One value per active joint in chain order [rad or m]; unused tail entries are exactly 0, so
-/// that norms and costs may run over all lanes.
-pub type JointVector = [f64; MAX_DOF];

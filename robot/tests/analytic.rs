@@ -235,7 +235,7 @@ fn a_branch_is_followed_and_keeps_its_name() {
         for _ in 0..count {
             let (from, toward) = (random(&arm, &mut rng), random(&arm, &mut rng));
             let at = |t: f64| -> JointVector {
-                std::array::from_fn(|i| from[i] + 0.05 * t * (toward[i] - from[i]))
+                JointVector::from_fn(|i| from[i] + 0.05 * t * (toward[i] - from[i]))
             };
             arm.ik().solve(&arm.tip_pose(&from), value(&arm, &from), &mut out);
             let start = out.iter().find(|s| farthest(&s.q, &from) < 1e-4);

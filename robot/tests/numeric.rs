@@ -86,7 +86,7 @@ fn a_branch_is_followed_along_a_path() {
             let mut reached = true;
             for k in 1..=parts {
                 let t = f64::from(k) / f64::from(parts);
-                let q: JointVector = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t);
+                let q: JointVector = JointVector::from_fn(|i| from[i] + (to[i] - from[i]) * t);
                 steps += 1;
                 let Some(next) = ik.solve_on(branch, &arm.tip_pose(&q), value(&q), &near) else {
                     reached = false;

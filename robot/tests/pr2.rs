@@ -167,7 +167,7 @@ fn one_branch_follows_a_path_without_a_jump() {
             let (from, mut to) = (random(&arm, &mut rng), random(&arm, &mut rng));
             to[4] += 7.0; // more than a turn of a continuous joint
             let at = |t: f64| -> JointVector {
-                std::array::from_fn(|i| from[i] + (to[i] - from[i]) * t)
+                JointVector::from_fn(|i| from[i] + (to[i] - from[i]) * t)
             };
             ik.solve(&arm.tip_pose(&from), from[given], &mut solutions);
             let start = solutions.iter().find(|s| farthest(&s.q, &from) < 1e-6).unwrap();
@@ -219,7 +219,7 @@ fn check_reached(arm: &Arm, ik: &dyn InverseKinematics, q: &JointVector, within:
 #[test]
 fn singular_postures_are_solved() {
     let arm = arm(Side::Right);
-    let generic = [-0.5, 0.4, -1.2, -1.3, 0.7, -1.1, 0.4, 0.0];
+    let generic = JointVector::new([-0.5, 0.4, -1.2, -1.3, 0.7, -1.1, 0.4, 0.0]);
     let with = |changes: &[(usize, f64)]| {
         let mut q = generic;
         for &(i, value) in changes {
@@ -268,7 +268,7 @@ fn wrist_centre_on_the_pan_axis_keeps_its_pan() {
         let middle = 0.5 * (low + high);
         if out(middle) > 0.0 { low = middle } else { high = middle }
     }
-    let q = [-0.4, lift, 0.0, low, 0.3, -0.8, 0.2, 0.0];
+    let q = JointVector::new([-0.4, lift, 0.0, low, 0.3, -0.8, 0.2, 0.0]);
     let target = arm.tip_pose(&q);
     let solutions = check_reached(&arm, arm.ik(), &q, 1e-7);
     let found = solutions

@@ -134,7 +134,7 @@ fn the_held_arm_is_out_of_the_way() {
         let arm = robot.arm(&ArmSpec::pr2(side)).unwrap();
         assert_eq!(arm.held_joints().len(), 8, "the torso and the other arm");
         let held = robot.arm(&ArmSpec::pr2(other)).unwrap();
-        let q: JointVector = std::array::from_fn(|i| {
+        let q: JointVector = JointVector::from_fn(|i| {
             held.joint_names().get(i).map_or(0.0, |name| {
                 arm.held_joints().iter().find(|h| h.name == *name).unwrap().position
             })
@@ -154,7 +154,7 @@ fn working_postures_do_not_touch_themselves() {
     let total = 100;
     let mut touching = 0;
     for _ in 0..total {
-        let mut q = [0.0; 8];
+        let mut q = JointVector::ZERO;
         for (i, q) in q.iter_mut().enumerate().take(7) {
             let (lower, upper) = arm.margined_limits()[i];
             *q = rng.random_range(lower.max(-3.1)..upper.min(3.1));

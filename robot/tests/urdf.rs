@@ -4,7 +4,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
 use nullsweep_robot::{
-    ArmError, ArmSpec, Geometry, JointKind, JointLimits, Robot, Side, Solutions, UrdfError,
+    ArmError, ArmSpec, Geometry, JointKind, JointLimits, JointVector, Robot, Side, Solutions,
+    UrdfError,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -184,7 +185,7 @@ fn mimic_joints_follow_and_are_not_held() {
     assert_eq!(held, ["left"]);
     let arm = arm.with_held(&[("left", 0.3)]).unwrap();
     let mut poses = vec![Isometry3::identity(); 5];
-    let mut q = [0.0; 8];
+    let mut q = JointVector::ZERO;
     q[0] = 1.0;
     arm.link_poses(&q, &mut poses);
     let local = |link: usize| (poses[1].inverse() * poses[link]).translation.vector;
@@ -299,7 +300,7 @@ fn shape_is_recognised_in_other_frames() {
     let mut out = Solutions::new();
     for ik in ik {
         for k in 0..500 {
-            let q: [f64; 8] = std::array::from_fn(|i| {
+            let q = JointVector::from_fn(|i| {
                 if i < 7 { f64::from(k * (i as i32 + 3) % 57) / 10.0 - 2.8 } else { 0.0 }
             });
             let target = arm.tip_pose(&q);

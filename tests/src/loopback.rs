@@ -126,8 +126,8 @@ impl Loopback {
             setpoint.stamp_ns = self.now_ns;
             setpoint.deadline_ns = self.now_ns + self.guard.period_ns;
             setpoint.plan = target.plan;
-            setpoint.positions[..MAX_DOF].copy_from_slice(&target.q);
-            setpoint.velocities[..MAX_DOF].copy_from_slice(&target.v);
+            setpoint.positions[..MAX_DOF].copy_from_slice(&target.q[..]);
+            setpoint.velocities[..MAX_DOF].copy_from_slice(&target.v[..]);
             setpoint.joint_count = self.guard.dof as u32;
             setpoint.mode = target.mode.wire();
             setpoint.knot = target.knot;

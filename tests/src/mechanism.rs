@@ -326,16 +326,16 @@ mod tests {
     #[test]
     fn efforts_come_back_through_the_transmissions() {
         let m = mechanism();
-        let efforts = [3.0, -2.0, 1.0, 0.5, -0.4, 4.0, -3.0, 0.0];
+        let efforts = JointVector::new([3.0, -2.0, 1.0, 0.5, -0.4, 4.0, -3.0, 0.0]);
         let back = joint_efforts(&m.motors(&efforts));
         for j in 0..JOINTS {
             assert!((back[j] - efforts[j]).abs() < 1e-12, "joint {j}: {}", back[j]);
         }
         // Both wrist joints at their limit ask more of one motor than it has.
-        let greedy = [0.0, 0.0, 0.0, 0.0, 0.0, 10.0, 10.0, 0.0];
+        let greedy = JointVector::new([0.0, 0.0, 0.0, 0.0, 0.0, 10.0, 10.0, 0.0]);
         let back = joint_efforts(&m.motors(&greedy));
         assert!(back[FLEX] < 10.0 + 1e-12 && back[FLEX] + back[ROLL] <= 20.0 + 1e-9);
-        let more = [0.0, 0.0, 0.0, 0.0, 0.0, 20.0, 20.0, 0.0];
+        let more = JointVector::new([0.0, 0.0, 0.0, 0.0, 0.0, 20.0, 20.0, 0.0]);
         let back = joint_efforts(&m.motors(&more));
         assert!((back[FLEX] - 10.0).abs() < 1e-9, "{}", back[FLEX]);
     }

@@ -48,7 +48,7 @@ impl Sketch {
             for piece in 1..=pieces {
                 let share = f64::from(piece) / f64::from(pieces);
                 let between = |j: usize| from[j] + (to[j] - from[j]) * share;
-                let q = if piece == pieces { *to } else { std::array::from_fn(between) };
+                let q = if piece == pieces { *to } else { JointVector::from_fn(between) };
                 time_ns += piece_ns;
                 knots.push(knot(arm, time_ns, &q));
             }
@@ -91,7 +91,7 @@ impl Sketch {
             .map(|k| {
                 let share = f64::from(k) / f64::from(knots - 1);
                 let bump = 1.0 - (2.0 * share - 1.0).abs();
-                let q: JointVector = std::array::from_fn(|j| from[j] + (out[j] - from[j]) * bump);
+                let q: JointVector = JointVector::from_fn(|j| from[j] + (out[j] - from[j]) * bump);
                 knot(arm, (share * seconds * 1e9).round() as u64, &q)
             })
             .collect();

@@ -6,7 +6,6 @@
 
 use core::fmt;
 
-use crate::MAX_DOF;
 use nullsweep_ipc_types::{
     Interpolation, JoinRule, Knot, MAX_HELD_JOINTS, MAX_KNOTS, PlanHeader, PlanId, PlanMessage,
     Reason, checksum,
@@ -14,6 +13,7 @@ use nullsweep_ipc_types::{
 
 use crate::guard::Guard;
 use crate::interpolate::{PlanKnot, reach, top_speed};
+use crate::{JointVector, MAX_DOF};
 
 /// Plan times are whole nanoseconds in an `f64`. \[ns\]
 const LONGEST_NS: u64 = 1 << 53;
@@ -289,8 +289,8 @@ fn read(knots: &[Knot], joints: usize) -> Result<Vec<PlanKnot>, Rejection> {
     for (i, knot) in knots.iter().enumerate() {
         let mut own = PlanKnot {
             time: knot.time_from_start_ns as f64,
-            q: [0.0; MAX_DOF],
-            v: [0.0; MAX_DOF],
+            q: JointVector::ZERO,
+            v: JointVector::ZERO,
             ramp: RAMP.0,
         };
         for j in 0..joints {
@@ -354,7 +354,7 @@ fn check_end(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
     else {
         return Ok(());
     };
-    guard.matches_velocity(&last.v, &[0.0; MAX_DOF]).map_err(|(joint, speed)| {
+    guard.matches_velocity(&last.v, &JointVector::ZERO).map_err(|(joint, speed)| {
         Rejection::new(Reason::Velocity)
             .knot(plan.knots.len() - 1)
             .joint(joint)

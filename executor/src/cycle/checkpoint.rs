@@ -5,7 +5,7 @@ use nullsweep_ipc_types::{Fault, Mode};
 
 use super::supervise::Watch;
 use super::{Measured, REMEMBERED, State};
-use crate::{Joints, MAX_DOF};
+use crate::JointVector;
 
 /// A [`State`] without plans.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -15,8 +15,8 @@ pub struct Checkpoint {
     missed: u64,
     sequence: u64,
     scale: f64,
-    q: Joints,
-    v: Joints,
+    q: JointVector,
+    v: JointVector,
     mode: u32,
     fault: u32,
     has_position: u32,
@@ -32,8 +32,8 @@ pub struct Checkpoint {
     window_start_ns: u64,
     windows: u64,
     rates: [f64; 3],
-    remembered: [Joints; REMEMBERED],
-    remembered_v: [Joints; REMEMBERED],
+    remembered: [JointVector; REMEMBERED],
+    remembered_v: [JointVector; REMEMBERED],
 }
 
 /// A [`Measured`] as plain bytes.
@@ -42,7 +42,7 @@ pub struct Checkpoint {
 pub struct MeasuredRecord {
     stamp_ns: u64,
     setpoint_sequence: u64,
-    q: [f64; MAX_DOF],
+    q: JointVector,
     joint_count: u32,
     status: u32,
 }

@@ -24,11 +24,10 @@ mod supervise;
 
 use std::sync::Arc;
 
-use crate::MAX_DOF;
 use heapless::{Deque, Vec};
 use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanId, Reason};
 
-use crate::Joints;
+use crate::JointVector;
 use crate::admit::{Rejection, ValidPlan};
 use crate::guard::Guard;
 use crate::path::Path;
@@ -76,9 +75,9 @@ pub struct Target {
     /// Rises by one each cycle.
     pub sequence: u64,
     /// \[rad\] or \[m\]
-    pub q: Joints,
+    pub q: JointVector,
     /// \[rad/s\] or \[m/s\]
-    pub v: Joints,
+    pub v: JointVector,
     /// The plan, [`PlanId::NONE`] without one.
     pub plan: PlanId,
     /// Its knot.
@@ -152,8 +151,8 @@ pub struct State {
     cycle: u64,
     missed: u64,
     sequence: u64,
-    q: Joints,
-    v: Joints,
+    q: JointVector,
+    v: JointVector,
     has_position: bool,
     path: Option<Path>,
     /// Whether the path's plan still needs its end event; not while a fault brakes on it.
@@ -165,8 +164,8 @@ pub struct State {
     disabled: bool,
     shutdown: bool,
     watch: supervise::Watch,
-    remembered: [Joints; REMEMBERED],
-    remembered_v: [Joints; REMEMBERED],
+    remembered: [JointVector; REMEMBERED],
+    remembered_v: [JointVector; REMEMBERED],
 }
 
 impl Default for State {
@@ -177,8 +176,8 @@ impl Default for State {
             cycle: 0,
             missed: 0,
             sequence: 0,
-            q: [0.0; MAX_DOF],
-            v: [0.0; MAX_DOF],
+            q: JointVector::ZERO,
+            v: JointVector::ZERO,
             has_position: false,
             path: None,
             live: false,
@@ -189,8 +188,8 @@ impl Default for State {
             disabled: false,
             shutdown: false,
             watch: supervise::Watch::default(),
-            remembered: [[0.0; MAX_DOF]; REMEMBERED],
-            remembered_v: [[0.0; MAX_DOF]; REMEMBERED],
+            remembered: [JointVector::ZERO; REMEMBERED],
+            remembered_v: [JointVector::ZERO; REMEMBERED],
         }
     }
 }
@@ -217,9 +216,9 @@ pub struct Snapshot {
     /// Speed scale asked for.
     pub scale: f64,
     /// Commanded positions. \[rad\] or \[m\]
-    pub commanded: Joints,
+    pub commanded: JointVector,
     /// Measured positions, 0 before the first state. \[rad\] or \[m\]
-    pub measured: Joints,
+    pub measured: JointVector,
 }
 
 impl State {
@@ -238,7 +237,7 @@ impl State {
             rate: path.map_or(0.0, |p| p.progress().rate),
             scale: self.scale,
             commanded: self.q,
-            measured: self.watch.measured().map_or([0.0; MAX_DOF], |m| m.q),
+            measured: self.watch.measured().map_or(JointVector::ZERO, |m| m.q),
         }
     }
 
@@ -326,7 +325,7 @@ impl State {
             out.retire(path.into_plan());
         }
         self.live = false;
-        self.v = [0.0; MAX_DOF];
+        self.v = JointVector::ZERO;
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::MAX_DOF;
 use nullsweep_ipc_types::{EventKind, Fault, Mode, Reason};
 
 use super::{Output, State, StopCause, Turn};
+use crate::JointVector;
 use crate::admit::{Rejection, ValidPlan};
 use crate::guard::Guard;
 use crate::interpolate::Sample;
@@ -22,7 +22,7 @@ impl State {
         let go = self.stop.is_none() && !self.paused && self.mode != Mode::Fault;
         let target = if go { self.scale } else { 0.0 };
         let Some(path) = self.path.as_mut() else {
-            self.v = [0.0; MAX_DOF];
+            self.v = JointVector::ZERO;
             return;
         };
         path.advance(target, guard);
@@ -32,7 +32,7 @@ impl State {
         let ended = path.ended();
         let still = path.progress().rate <= 0.0;
         if ended || still {
-            sample.v = [0.0; MAX_DOF];
+            sample.v = JointVector::ZERO;
         }
         if let Err(fault) = self.allows(&sample, guard) {
             self.freeze(fault, out);

@@ -9,11 +9,10 @@ use std::sync::Arc;
 use nullsweep_ipc_types::{EventKind, Fault, Interpolation, Mode, PlanId, Reason};
 
 use super::{Output, State, StopCause, Turn, Waiting};
-use crate::Joints;
-use crate::MAX_DOF;
 use crate::admit::{Join, Rejection, ValidPlan};
 use crate::guard::Guard;
 use crate::path::Path;
+use crate::{JointVector, MAX_DOF};
 
 impl State {
     /// Accepts or rejects a plan, with exactly one event for it.
@@ -72,7 +71,7 @@ impl State {
     /// Whether the plan's first knot is where the arm holds.
     pub(super) fn starts_at(
         plan: &ValidPlan,
-        holds: &Joints,
+        holds: &JointVector,
         guard: &Guard,
     ) -> Result<(), Rejection> {
         let Some(first) = plan.knots().first() else { return Ok(()) };
@@ -82,9 +81,9 @@ impl State {
         }
         // A curve that is already under way at its first knot cannot start from a stand-still.
         if plan.interpolation() == Interpolation::Cubic {
-            return guard.matches_velocity(&[0.0; MAX_DOF], &first.v).map_err(|(joint, step)| {
-                start.joint(joint).value(step, guard.velocity_tolerance())
-            });
+            return guard.matches_velocity(&JointVector::new([0.0; MAX_DOF]), &first.v).map_err(
+                |(joint, step)| start.joint(joint).value(step, guard.velocity_tolerance()),
+            );
         }
         Ok(())
     }

@@ -1,10 +1,9 @@
 //! Is the endpoint there, sound, and following?
 
-use crate::MAX_DOF;
 use nullsweep_ipc_types::{EventKind, Fault, Mode, Reason, status};
 
 use super::{Output, REMEMBERED, State, StopCause};
-use crate::Joints;
+use crate::JointVector;
 use crate::guard::Guard;
 
 /// Windows whose mean rate is judged, and the length of each. \[ns\]
@@ -23,7 +22,7 @@ pub struct Measured {
     /// How many joints the endpoint has.
     pub joint_count: usize,
     /// Measured positions. \[rad\] or \[m\]
-    pub q: Joints,
+    pub q: JointVector,
     /// Bits of [`status`], and [`HELD_MOVED`].
     pub status: u32,
 }
@@ -236,12 +235,12 @@ impl State {
     }
 
     /// Moves the commanded position towards a measured one, no faster than each joint may.
-    fn creep(&mut self, to: &Joints, guard: &Guard) {
+    fn creep(&mut self, to: &JointVector, guard: &Guard) {
         for (j, bound) in guard.used().iter().enumerate() {
             let step = bound.velocity() * guard.period();
             self.q[j] += (to[j] - self.q[j]).clamp(-step, step);
         }
-        self.v = [0.0; MAX_DOF];
+        self.v = JointVector::ZERO;
     }
 
     /// What the motion relies on is gone: it stops on its path, and nothing is latched.

@@ -12,7 +12,7 @@ use crate::admit::{Join, ValidPlan};
 use crate::cycle::{Ask, Input, Measured, MeasuredRecord, Order, Target};
 use crate::guard::Guard;
 use crate::interpolate::PlanKnot;
-use crate::{Joints, MAX_DOF};
+use crate::{JointVector, MAX_DOF};
 
 /// The first bytes of a recording; the digit is the version.
 pub(crate) const MAGIC: &[u8; 8] = b"NSWREC3\n";
@@ -200,8 +200,8 @@ pub(crate) struct CycleRecord {
 #[repr(C)]
 pub(crate) struct TargetRecord {
     pub sequence: u64,
-    pub q: Joints,
-    pub v: Joints,
+    pub q: JointVector,
+    pub v: JointVector,
     pub plan: PlanId,
     pub knot: u32,
     pub mode: u32,

@@ -24,7 +24,7 @@ fn a_setpoint_that_differs_in_one_bit_is_found() {
         stamp_ns: 1,
         ..JointStates::zeroed()
     };
-    states.positions[..8].copy_from_slice(&HOME);
+    states.positions[..8].copy_from_slice(&HOME[..]);
     let slots = Arc::new(Slots::default());
     let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
     driver.record(tape);

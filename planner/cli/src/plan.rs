@@ -290,7 +290,7 @@ fn job(args: &PlanArgs, robot: &Robot, scene: &Scene, after: Option<After>) -> a
         }
     };
     ensure!(args.start.len() <= MAX_DOF, "--start has more than {MAX_DOF} joints");
-    let mut start: JointVector = [0.0; MAX_DOF];
+    let mut start: JointVector = JointVector::ZERO;
     start[..args.start.len()].copy_from_slice(&args.start);
     let line_wave = tool.width;
     Ok(Job {

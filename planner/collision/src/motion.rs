@@ -185,7 +185,7 @@ impl World {
     /// joint line from `a` to `b`. \[m\]
     #[must_use]
     pub fn motion_bound(&self, a: &JointVector, b: &JointVector) -> f64 {
-        let way: JointVector = std::array::from_fn(|j| (b[j] - a[j]).abs());
+        let way: JointVector = JointVector::from_fn(|j| (b[j] - a[j]).abs());
         let bodies = 0..self.bodies.bodies.len();
         bodies.map(|body| self.reach.way(body, &way)).fold(0.0, f64::max)
     }

@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
-use nullsweep_robot::{JointVector, MAX_DOF};
+use nullsweep_robot::JointVector;
 
 use crate::ToolContact;
 use crate::bodies::MAX_BODIES;
@@ -103,12 +103,12 @@ impl World {
 
 impl<'a> Proof<'a> {
     fn new(world: &'a World, path: &'a [JointVector], contact: ToolContact) -> Self {
-        let mut ways = vec![[0.0; MAX_DOF]];
+        let mut ways = vec![JointVector::ZERO];
         let mut bends = Vec::with_capacity(path.len());
         for pair in path.windows(2) {
-            let way = std::array::from_fn(|j| (pair[1][j] - pair[0][j]).abs());
+            let way = pair[0].displacement(&pair[1]);
             let before = ways[ways.len() - 1];
-            ways.push(std::array::from_fn(|j| before[j] + way[j]));
+            ways.push(before + way);
             let mut bend = [0.0; MAX_BODIES];
             for (body, bend) in bend.iter_mut().enumerate().take(world.bodies.bodies.len()) {
                 *bend = world.reach.bend(body, &way);
@@ -170,7 +170,7 @@ impl<'a> Proof<'a> {
             Piece::Line { knot, from, to, .. } => {
                 let at = |t: f64| -> JointVector {
                     let (a, b) = (&self.path[knot], &self.path[knot + 1]);
-                    std::array::from_fn(|j| a[j] + t * (b[j] - a[j]))
+                    JointVector::from_fn(|j| a[j] + t * (b[j] - a[j]))
                 };
                 middle = Posture::of(self.world, &at(0.5 * (from + to)));
                 let halfway = |t: f64| Posture::of(self.world, &at(t));
@@ -202,7 +202,7 @@ impl<'a> Proof<'a> {
     /// `from` and `to`.
     fn slack(&self, moves: u32, from: usize, at: usize, to: usize) -> Slack<'a> {
         let reach = &self.world.reach;
-        let way: JointVector = std::array::from_fn(|j| {
+        let way: JointVector = JointVector::from_fn(|j| {
             let here = self.ways[at][j];
             (here - self.ways[from][j]).max(self.ways[to][j] - here)
         });
@@ -231,7 +231,7 @@ impl<'a> Proof<'a> {
         let reach = &self.world.reach;
         let half = 0.5 * share;
         let way: JointVector =
-            std::array::from_fn(|j| half * (self.ways[knot + 1][j] - self.ways[knot][j]));
+            JointVector::from_fn(|j| half * (self.ways[knot + 1][j] - self.ways[knot][j]));
         let mut slack = Slack::new(reach, way);
         for body in each(moves) {
             let of = |posture: &'_ Posture| (posture.poses[body], posture.centres[body]);

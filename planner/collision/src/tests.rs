@@ -204,7 +204,7 @@ fn free_motions_are_free_all_along() {
         let far = draw();
         // Short motions and long ones.
         let reach = if n % 4 < 2 { 0.1 } else { 1.0 };
-        let b: JointVector = std::array::from_fn(|j| a[j] + reach * (far[j] - a[j]));
+        let b: JointVector = JointVector::from_fn(|j| a[j] + reach * (far[j] - a[j]));
         if !world.motion_free(&a, &b, contact) {
             blocked += 1;
             continue;
@@ -212,7 +212,7 @@ fn free_motions_are_free_all_along() {
         free += 1;
         for step in 0..=100 {
             let t = f64::from(step) / 100.0;
-            let q: JointVector = std::array::from_fn(|j| a[j] + t * (b[j] - a[j]));
+            let q: JointVector = JointVector::from_fn(|j| a[j] + t * (b[j] - a[j]));
             let hit = world.exact().first_hit(&q, contact);
             assert!(hit.is_none(), "motion {n} at {t}: {}", hit.unwrap());
         }
@@ -239,7 +239,7 @@ fn no_point_moves_farther_than_the_motion_bound() {
                 let mut before: Option<Vector3<f64>> = None;
                 for step in 0..=200 {
                     let t = f64::from(step) / 200.0;
-                    let q: JointVector = std::array::from_fn(|j| a[j] + t * (b[j] - a[j]));
+                    let q: JointVector = JointVector::from_fn(|j| a[j] + t * (b[j] - a[j]));
                     let at = world.bodies.poses(&q)[shape.body].apply(&in_body);
                     way += before.map_or(0.0, |x| (at - x).norm());
                     before = Some(at);

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Rotation3, Vector3};
-use nullsweep_planner::cost::displacement;
 use nullsweep_planner::plan::Method;
 use nullsweep_planner::tour::formulation;
 use nullsweep_planner::workcell::direction;
@@ -104,14 +103,14 @@ fn process(area: &Area<'_>, setting: &Setting, runs: &[(Method, Run)], view: &Vi
 /// Figure 4: displacement of each joint along the whole path.
 fn joints(area: &Area<'_>, setting: &Setting, runs: &[(Method, Run)]) -> Drawn {
     let dof = setting.arm.dof();
-    let continuous = setting.continuous();
+    let continuous = setting.arm.continuous();
     let moved: Vec<Vec<f64>> = runs
         .iter()
         .map(|(_, run)| {
             let mut sums = vec![0.0; dof];
             for pair in run.path.windows(2) {
-                let d = displacement(&continuous, &pair[0].1, &pair[1].1);
-                sums.iter_mut().zip(d).for_each(|(sum, d)| *sum += d);
+                let d = continuous.displacement(&pair[0].1, &pair[1].1);
+                sums.iter_mut().zip(&d).for_each(|(sum, d)| *sum += d);
             }
             sums
         })

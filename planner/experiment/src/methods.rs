@@ -3,12 +3,12 @@
 
 use std::time::Instant;
 
-use nullsweep_planner::cost::{Cost, Effort, TaskTime, displacement};
+use nullsweep_planner::cost::{Cost, Effort, TaskTime};
 use nullsweep_planner::plan::{CostKind, Method};
 use nullsweep_planner::tour::formulation::{self, FormulationConfig, FormulationError, JUMP, Stop};
 use nullsweep_planner::tour::joint::{self, Cluster, JointConfig, Layers, Metric, Problem};
 use nullsweep_planner::workcell::Sample;
-use nullsweep_robot::{JointVector, MAX_DOF};
+use nullsweep_robot::JointVector;
 use rayon::prelude::*;
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,7 @@ pub fn plan(setting: &Setting, task: &Task) -> Result<Run, FormulationError> {
 }
 
 fn time(setting: &Setting) -> TaskTime {
-    let mut velocity = [0.0; MAX_DOF];
+    let mut velocity = JointVector::ZERO;
     velocity[..setting.arm.dof()].fill(V_MAX);
     TaskTime::new(&velocity)
 }
@@ -89,7 +89,7 @@ fn time(setting: &Setting) -> TaskTime {
 /// A cost that is not a number.
 pub fn by_cost<C: Cost>(setting: &Setting, task: &Task, cost: &C) -> Result<Run, FormulationError> {
     let (begin, processor) = (Instant::now(), processor_time());
-    let metric = Metric::new(cost, setting.continuous(), setting.arm.dof(), 0.0);
+    let metric = Metric::new(cost, setting.arm.continuous(), setting.arm.dof(), 0.0);
     let graph = &setting.graph;
     let (patches, tool, here) = (&setting.patches, &setting.tool, setting.tool_pose());
     let config = FormulationConfig { from_nearest: true, ..task.formulation };
@@ -170,11 +170,11 @@ fn processor_time() -> f64 {
 
 /// The figures of a path that lie in it alone.
 fn measure(setting: &Setting, path: &[(Stop, JointVector)]) -> Figures {
-    let (continuous, time) = (setting.continuous(), time(setting));
+    let (continuous, time) = (setting.arm.continuous(), time(setting));
     let mut figures = Figures::default();
     for pair in path.windows(2) {
         let [(a, p), (b, q)] = [pair[0], pair[1]];
-        let moved = displacement(&continuous, &p, &q);
+        let moved = continuous.displacement(&p, &q);
         figures.effort_rad += Effort.of(&moved);
         figures.task_time_s += time.of(&moved);
         figures.distance_m +=

@@ -253,7 +253,7 @@ pub fn look_between(
         &Options::default(),
     )?;
     let contact = setting.tool.contact_in_tip();
-    let continuous = setting.continuous();
+    let continuous = setting.arm.continuous();
     let free = |run: &Run, k: usize| world.is_free(&run.path[k].1, ToolContact::Allowed);
     let mut straight = Straight { poses: run.path.len(), ..Straight::default() };
     straight.colliding_poses = (0..run.path.len()).filter(|&k| !free(run, k)).count();
@@ -265,15 +265,11 @@ pub fn look_between(
         }
         straight.motions += 1;
         // Continuous joints the short way round.
-        let q = std::array::from_fn(|j| {
-            let turns =
-                if continuous[j] { ((q[j] - p[j]) / std::f64::consts::TAU).round() } else { 0.0 };
-            q[j] - turns * std::f64::consts::TAU
-        });
+        let q = continuous.nearest_turn(&q, &p);
         straight.colliding_motions += usize::from(!world.motion_free(&p, &q, ToolContact::Allowed));
         for k in 1..STEPS {
             let t = k as f64 / STEPS as f64;
-            let between = std::array::from_fn(|j| p[j] + t * (q[j] - p[j]));
+            let between = p.lerp(&q, t);
             let pad = setting.arm.tip_pose(&between) * contact;
             off.push(off_surface(setting, &pad.translation.vector.into()));
         }

@@ -5,7 +5,7 @@ use nullsweep_planner::roadmap::{Graph, GraphConfig, graph};
 use nullsweep_planner::tour::formulation::{self, Stop};
 use nullsweep_planner::workcell::stance::{self, Stance, StanceSearch};
 use nullsweep_planner::workcell::{Sample, contact_pose, direction, middle_out, redundancies};
-use nullsweep_robot::{Arm, ArmError, ArmSpec, JointVector, MAX_DOF, Robot, Solutions, Tool};
+use nullsweep_robot::{Arm, ArmError, ArmSpec, JointVector, Robot, Solutions, Tool};
 use nullsweep_surface::patches::{self, Patch, PatchConfig};
 use nullsweep_surface::scan::Scan;
 use nullsweep_surface::sheet::Surface;
@@ -114,16 +114,6 @@ impl Setting {
     #[must_use]
     pub fn tool_pose(&self) -> Isometry3<f64> {
         self.arm.tip_pose(&self.start) * self.tool.contact_in_tip()
-    }
-
-    /// Which joints turn without end.
-    #[must_use]
-    pub fn continuous(&self) -> [bool; MAX_DOF] {
-        let mut continuous = [false; MAX_DOF];
-        for (c, limits) in continuous.iter_mut().zip(self.arm.limits()) {
-            *c = limits.continuous;
-        }
-        continuous
     }
 
     /// Appends the samples at a stop: `count` values of the redundancy as in §V, a few of them each

@@ -234,7 +234,13 @@ mod tests {
         let knot = |k: u64| {
             let mut q = [0.0; MAX_DOF];
             q[0] = 0.1 * k as f64;
-            PlanKnot { time_ns: k * 1_000_000_000, q, v: [0.0; MAX_DOF], line: None, patch: None }
+            PlanKnot {
+                time_ns: k * 1_000_000_000,
+                q: JointVector::new(q),
+                v: JointVector::ZERO,
+                line: None,
+                patch: None,
+            }
         };
         Plan {
             format: FORMAT,

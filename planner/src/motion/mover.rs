@@ -56,7 +56,7 @@ const LIFT_ANGLE: f64 = 0.8;
 
 /// What a jump adds to its way, for an arm of `dof` joints.
 pub(crate) fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
-    let mut lift = [0.0; nullsweep_robot::MAX_DOF];
+    let mut lift = JointVector::ZERO;
     lift[..LIFT_JOINTS.min(dof)].fill(LIFT_ANGLE);
     cost.of(&lift)
 }

@@ -5,7 +5,7 @@
 //! given joint vector and end at the other one but for whole turns of continuous joints, which are
 //! left out wherever that is nearer: paths are unwrapped. No path is a result, not an error.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 use nullsweep_collision::{ToolContact, World};
@@ -54,7 +54,7 @@ pub fn jump(
     seed: u64,
 ) -> Option<Vec<JointVector>> {
     let options = Options::default();
-    let to = nearest_turn(cell.arm, to, from);
+    let to = cell.arm.continuous().nearest_turn(to, from);
     let mut path = lift(cell, from)?;
     let mut down = lift(cell, &to)?;
     down.reverse();
@@ -63,10 +63,8 @@ pub fn jump(
     let arrived = *across.last()?;
     path.extend(across);
     // The set-down turns with the transfer's end.
-    let turns: JointVector = std::array::from_fn(|j| arrived[j] - goal[j]);
-    path.extend(
-        down[1..].iter().map(|q| -> JointVector { std::array::from_fn(|j| q[j] + turns[j]) }),
-    );
+    let turns = arrived - goal;
+    path.extend(down[1..].iter().map(|q| *q + turns));
     Some(path)
 }
 
@@ -149,7 +147,7 @@ pub fn plan(
     options: &Options,
     seed: u64,
 ) -> Option<Vec<JointVector>> {
-    let goal = nearest_turn(arm, to, from);
+    let goal = arm.continuous().nearest_turn(to, from);
     let free = |a: &JointVector, b: &JointVector| world.motion_free(a, b, ToolContact::Forbidden);
     if !world.is_free(from, ToolContact::Forbidden) || !world.is_free(&goal, ToolContact::Forbidden)
     {
@@ -198,17 +196,6 @@ pub fn plan(
     None
 }
 
-/// `q` with whole turns of its continuous joints taken away so that it is nearest to `near`.
-fn nearest_turn(arm: &Arm, q: &JointVector, near: &JointVector) -> JointVector {
-    let mut out = *q;
-    for (j, limits) in arm.limits().iter().enumerate() {
-        if limits.continuous {
-            out[j] -= ((q[j] - near[j]) / TAU).round() * TAU;
-        }
-    }
-    out
-}
-
 /// The joint vector near `from` that puts the tip on `target`, by damped least squares.
 fn reach_for(
     arm: &Arm,
@@ -253,7 +240,7 @@ impl Tree {
     ) -> Option<usize> {
         let mut nearest = (f64::INFINITY, 0);
         for (index, (q, _)) in self.nodes.iter().enumerate() {
-            let distance = distance(q, target);
+            let distance = q.distance(target);
             if distance < nearest.0 {
                 nearest = (distance, index);
             }
@@ -283,12 +270,8 @@ impl Tree {
         free: impl Fn(&JointVector, &JointVector) -> bool,
     ) -> Option<usize> {
         let from = self.nodes[parent].0;
-        let length = distance(&from, target);
-        let next = if length <= step {
-            *target
-        } else {
-            std::array::from_fn(|j| from[j] + step / length * (target[j] - from[j]))
-        };
+        let length = from.distance(target);
+        let next = if length <= step { *target } else { from.lerp(target, step / length) };
         free(&from, &next).then(|| {
             self.nodes.push((next, parent));
             self.nodes.len() - 1
@@ -333,13 +316,13 @@ fn shortcut(
         }
         let on = |(segment, t): (usize, f64)| -> JointVector {
             let (a, b) = (&path[segment], &path[segment + 1]);
-            std::array::from_fn(|j| a[j] + t * (b[j] - a[j]))
+            a.lerp(b, t)
         };
         let (a, b) = (on(first), on(second));
         let mut around = vec![a];
         around.extend(&path[first.0 + 1..=second.0]);
         around.push(b);
-        if distance(&a, &b) < length(&around) - 1e-9 && free(&a, &b) {
+        if a.distance(&b) < length(&around) - 1e-9 && free(&a, &b) {
             path.splice(first.0 + 1..=second.0, [a, b]);
         }
     }
@@ -354,12 +337,8 @@ fn shortcut(
     }
 }
 
-fn distance(a: &JointVector, b: &JointVector) -> f64 {
-    (0..MAX_DOF).map(|j| (b[j] - a[j]).powi(2)).sum::<f64>().sqrt()
-}
-
 fn length(path: &[JointVector]) -> f64 {
-    path.windows(2).map(|pair| distance(&pair[0], &pair[1])).sum()
+    path.windows(2).map(|pair| pair[0].distance(&pair[1])).sum()
 }
 
 #[cfg(test)]
@@ -446,14 +425,13 @@ mod tests {
         assert_eq!(path, jump(cell, &from, &to, 3).unwrap());
         assert_eq!(path[0], from);
         let end = path.last().unwrap();
-        assert_eq!(nearest_turn(&arm, &to, end), *end);
+        assert_eq!(arm.continuous().nearest_turn(&to, end), *end);
         let straight = [path[0], *end];
         assert!(length(&path) > length(&straight) + 0.1, "{} waypoints", path.len());
         for pair in path.windows(2) {
             for step in 0..=10 {
                 let t = f64::from(step) / 10.0;
-                let q: JointVector =
-                    std::array::from_fn(|j| pair[0][j] + t * (pair[1][j] - pair[0][j]));
+                let q = pair[0].lerp(&pair[1], t);
                 let hit = world.exact().first_hit(&q, ToolContact::Allowed);
                 assert!(hit.is_none(), "{}", hit.unwrap());
             }

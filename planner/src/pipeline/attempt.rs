@@ -1,6 +1,6 @@
 //! One plan for one set of patches, and the patches that are put over what it leaves out.
 
-use nullsweep_robot::{JointVector, MAX_DOF, Robot};
+use nullsweep_robot::{JointVector, Robot};
 use nullsweep_surface::patches::{self, Patch, PatchConfig};
 use nullsweep_surface::scan::Scan;
 use nullsweep_surface::sheet::Surface;
@@ -179,14 +179,14 @@ impl Context<'_> {
     /// left out.
     fn sequence<C: Cost>(&self, cost: &C, tour: &[Stop]) -> Result<Sequence, PipelineError> {
         let Shop { cell, job, start, progress, .. } = *self.shop;
-        let continuous = self.shop.continuous();
+        let continuous = cell.arm.continuous();
         let values = redundancies(cell.arm.ik().redundancy_range(), job.ik_samples);
         let layers: Vec<Vec<Sample>> =
             tour.par_iter().map(|stop| self.layer(stop, &values)).collect();
         let stops: Vec<usize> = tour.iter().map(|stop| stop.patch).collect();
         let mover = Mover::new(cell, self.graph, &stops, cost, start, job.seed);
         let mut dropped = Vec::new();
-        let path = layered::shortest(cost, &continuous, &start, &layers, &mover, &mut |layer| {
+        let path = layered::shortest(cost, continuous, &start, &layers, &mover, &mut |layer| {
             let patch = stops[layer];
             progress.note(&format!("patch {patch} is left out: no motion to it was found"));
             dropped.push(patch);
@@ -234,32 +234,19 @@ impl Context<'_> {
 }
 
 impl Shop<'_> {
-    /// Which joints turn without end.
-    pub(super) fn continuous(&self) -> [bool; MAX_DOF] {
-        let mut continuous = [false; MAX_DOF];
-        for (c, limits) in continuous.iter_mut().zip(self.cell.arm.limits()) {
-            *c = limits.continuous;
-        }
-        continuous
-    }
-
     /// Joins the legs, unwraps continuous joints and sets the times.
     pub(super) fn assemble(&self, patches: &[Patch], sequence: &Sequence) -> Plan {
         let Self { robot, job, stance, scan, .. } = *self;
         let arm = self.cell.arm;
         let mut knots: Vec<PlanKnot> = Vec::new();
         for Visit { patch, leg, .. } in &sequence.visits {
-            let shift = knots.last().map_or([0.0; MAX_DOF], |last| {
-                std::array::from_fn(|j| {
-                    let turns = (last.q[j] - leg.joints[0][j]) / std::f64::consts::TAU;
-                    turns.round() * std::f64::consts::TAU
-                })
-            });
+            let shift =
+                knots.last().map_or(JointVector::ZERO, |last| leg.joints[0].turns_to(&last.q));
             let first = usize::from(!knots.is_empty());
             for (q, line) in leg.joints.iter().zip(&leg.line).skip(first) {
-                let q = std::array::from_fn(|j| q[j] + shift[j]);
+                let q = *q + shift;
                 let line = line.map(|p| [p.x, p.y, p.z]);
-                knots.push(PlanKnot { time_ns: 0, q, v: [0.0; MAX_DOF], line, patch: None });
+                knots.push(PlanKnot { time_ns: 0, q, v: JointVector::ZERO, line, patch: None });
             }
             if let Some(last) = knots.last_mut() {
                 last.patch = Some(*patch as u32);

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::attempt::{Attempt, Shop, Visit};
 use super::{Clock, SWEPT_SHARE};
-use crate::cost::{Cost, Effort, TaskTime, displacement};
+use crate::cost::{Cost, Effort, TaskTime};
 use crate::motion::layered::{Motion, Moves};
 use crate::motion::mover::{Leg, Mover};
 use crate::plan::CostKind;
@@ -196,10 +196,9 @@ impl<C: Cost> Trip<'_, C> {
 
     /// A jump to the patch and one from there on, in place of a jump or at the end.
     fn through_free_space(&self) -> Option<(usize, Visit, After)> {
-        let continuous = self.shop.continuous();
-        let straight = |from: &JointVector, to: &JointVector| {
-            self.cost.of(&displacement(&continuous, from, to))
-        };
+        let continuous = self.shop.cell.arm.continuous();
+        let straight =
+            |from: &JointVector, to: &JointVector| self.cost.of(&continuous.displacement(from, to));
         let before = |at: usize| at.checked_sub(1).map(|b| &self.visits[b].sample);
         let q_before = |at: usize| before(at).map_or(&self.shop.start, |s| &s.q);
         let places: Vec<usize> = (0..self.visits.len())

@@ -40,7 +40,7 @@ impl Shop<'_> {
     ) -> Result<Vec<Stop>, FormulationError> {
         let Self { job, cell, .. } = *self;
         let lift = lift_cost(cost, cell.arm.dof());
-        let metric = &Metric::new(cost, self.continuous(), cell.arm.dof(), lift);
+        let metric = &Metric::new(cost, cell.arm.continuous(), cell.arm.dof(), lift);
         let values = redundancies(cell.arm.ik().redundancy_range(), job.ik_samples);
         let (mut source, mut seed) = (Some(self.start), job.seed);
         formulation::over_components(graph, patches, &job.tool, tool_pose, |component, here| {

@@ -68,7 +68,7 @@ fn posture(arm: &Arm, state: &collision::GroupState) -> Option<JointVector> {
     for (value, name) in q.iter_mut().zip(arm.joint_names()) {
         *value = state.joints.iter().find(|(joint, _)| joint == name)?.1;
     }
-    Some(q)
+    Some(JointVector::new(q))
 }
 
 /// The posture nearest to `home`, as shares of the joints' ranges, of many that are spread over

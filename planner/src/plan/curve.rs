@@ -15,8 +15,8 @@ impl Curve {
     /// The straight line between two positions.
     #[must_use]
     pub fn line(a: &JointVector, b: &JointVector, seconds: f64) -> Self {
-        let way = std::array::from_fn(|j| b[j] - a[j]);
-        Self { seconds, terms: [*a, way, [0.0; MAX_DOF], [0.0; MAX_DOF]], end: *b }
+        let way = *b - *a;
+        Self { seconds, terms: [*a, way, JointVector::ZERO, JointVector::ZERO], end: *b }
     }
 
     /// The cubic through two positions with given velocities (Hermite).
@@ -26,11 +26,11 @@ impl Curve {
         (b, vb): (&JointVector, &JointVector),
         seconds: f64,
     ) -> Self {
-        let first: JointVector = std::array::from_fn(|j| va[j] * seconds);
-        let last: JointVector = std::array::from_fn(|j| vb[j] * seconds);
-        let way: JointVector = std::array::from_fn(|j| b[j] - a[j]);
-        let second = std::array::from_fn(|j| 3.0 * way[j] - 2.0 * first[j] - last[j]);
-        let third = std::array::from_fn(|j| first[j] + last[j] - 2.0 * way[j]);
+        let first = JointVector::from_fn(|j| va[j] * seconds);
+        let last = JointVector::from_fn(|j| vb[j] * seconds);
+        let way = *b - *a;
+        let second = JointVector::from_fn(|j| 3.0 * way[j] - 2.0 * first[j] - last[j]);
+        let third = JointVector::from_fn(|j| first[j] + last[j] - 2.0 * way[j]);
         Self { seconds, terms: [*a, first, second, third], end: *b }
     }
 
@@ -47,20 +47,20 @@ impl Curve {
             return self.end;
         }
         let [a, b, c, d] = &self.terms;
-        std::array::from_fn(|j| a[j] + share * (b[j] + share * (c[j] + share * d[j])))
+        JointVector::from_fn(|j| a[j] + share * (b[j] + share * (c[j] + share * d[j])))
     }
 
     /// The velocity at a share of the time. \[rad/s\] or \[m/s\]
     #[must_use]
     pub fn velocity(&self, share: f64) -> JointVector {
-        std::array::from_fn(|j| self.slope(j, share) / self.seconds)
+        JointVector::from_fn(|j| self.slope(j, share) / self.seconds)
     }
 
     /// The acceleration at a share of the time. \[rad/s²\] or \[m/s²\]
     #[must_use]
     pub fn acceleration(&self, share: f64) -> JointVector {
         let [_, _, c, d] = &self.terms;
-        std::array::from_fn(|j| (2.0 * c[j] + 6.0 * share * d[j]) / self.seconds.powi(2))
+        JointVector::from_fn(|j| (2.0 * c[j] + 6.0 * share * d[j]) / self.seconds.powi(2))
     }
 
     /// The greatest speed of a joint. \[rad/s\] or \[m/s\]
@@ -130,8 +130,8 @@ mod tests {
             seconds in 0.001..2.0f64,
             straight in any::<bool>(),
         ) {
-            let [a, b] = ends.map(|q| [q; MAX_DOF]);
-            let [va, vb] = speeds.map(|v| [v; MAX_DOF]);
+            let [a, b] = ends.map(|q| JointVector::new([q; MAX_DOF]));
+            let [va, vb] = speeds.map(|v| JointVector::new([v; MAX_DOF]));
             let curve = if straight {
                 Curve::line(&a, &b, seconds)
             } else {

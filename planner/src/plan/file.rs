@@ -292,9 +292,9 @@ impl Plan {
 impl PlanKnot {
     fn wire(&self, on_surface: bool) -> Knot {
         let mut positions = [0.0; MAX_JOINTS];
-        positions[..MAX_DOF].copy_from_slice(&self.q);
+        positions[..MAX_DOF].copy_from_slice(&self.q[..]);
         let mut velocities = [0.0; MAX_JOINTS];
-        velocities[..MAX_DOF].copy_from_slice(&self.v);
+        velocities[..MAX_DOF].copy_from_slice(&self.v[..]);
         let contact = if on_surface { Contact::Contact } else { Contact::Transfer };
         Knot {
             time_from_start_ns: self.time_ns,

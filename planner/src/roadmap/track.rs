@@ -174,7 +174,7 @@ impl<'a> Run<'a> {
         if !is_step(&a.q, &b.q) {
             return Err(TrackFailure::Fold);
         }
-        let middle: JointVector = std::array::from_fn(|j| 0.5 * (a.q[j] + b.q[j]));
+        let middle: JointVector = JointVector::from_fn(|j| 0.5 * (a.q[j] + b.q[j]));
         let share = 0.5 * (a.share + b.share);
         let pose = self.path.between(self.knots.len() - 1, share);
         let pad = self.cell.arm.tip_pose(&middle) * self.contact_in_tip;

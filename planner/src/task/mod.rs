@@ -29,7 +29,7 @@ use nullsweep_robot::Tool;
 use nullsweep_surface::scan::Scan;
 use nullsweep_surface::sheet::Surface;
 use route::Route;
-use space::{Point, RESIDUAL, Space, distance};
+use space::{Point, RESIDUAL, Space};
 
 /// What is to be planned.
 #[derive(Clone, Debug)]
@@ -196,7 +196,7 @@ pub fn run(
     let figures = Figures {
         poses: poses.len(),
         met: route.order.iter().filter(|p| excess(p) < 10.0 * RESIDUAL).count(),
-        movement_rad: straight.iter().map(|(a, b)| distance(&a.q, &b.q)).sum(),
+        movement_rad: straight.iter().map(|(a, b)| a.q.distance(&b.q)).sum(),
         reconfigurations: edges.iter().flatten().count(),
         effort_rad: cost::of_path(&Effort, &joints),
         task_time_s: plan.duration(),

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use nullsweep_robot::JointVector;
 
-use super::space::{Point, Space, distance};
+use super::space::{Point, Space};
 
 /// Poses in the order in which they are visited, and the joint vector at each.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub(super) struct Task<'a> {
 impl Task<'_> {
     /// Length of an edge with its penalty. \[rad\]
     pub(super) fn edge(&self, a: &Point, b: &Point) -> f64 {
-        let length = distance(&a.q, &b.q);
+        let length = a.q.distance(&b.q);
         if self.space.is_reconfiguration(a, b) { length + PENALTY } else { length }
     }
 
@@ -73,16 +73,16 @@ impl Task<'_> {
             (Some(a), Some(b)) => {
                 // The way is shortest where both neighbours pull with the same force; Weiszfeld's
                 // step goes there, and the projection back onto what meets the pose.
-                let pull = |o: &Point| 1.0 / (distance(&o.q, &here.q) + 1e-3);
+                let pull = |o: &Point| 1.0 / (o.q.distance(&here.q) + 1e-3);
                 let (u, v) = (pull(a), pull(b));
-                std::array::from_fn(|j| (u * a.q[j] + v * b.q[j]) / (u + v))
+                JointVector::from_fn(|j| (u * a.q[j] + v * b.q[j]) / (u + v))
             }
             (Some(one), None) | (None, Some(one)) => one.q,
             (None, None) => return 0.0,
         };
         // The whole step, or less where it overshoots.
         for share in [1.0, 0.4, 0.1] {
-            let q = std::array::from_fn(|j| here.q[j] + share * (target[j] - here.q[j]));
+            let q = JointVector::from_fn(|j| here.q[j] + share * (target[j] - here.q[j]));
             let Some(point) = self.space.project(&self.poses[pose], &q) else { continue };
             let gain = old - local(&point);
             if gain > GAIN && self.space.is_free(&point) {
@@ -121,7 +121,7 @@ impl Task<'_> {
                         |k: Option<usize>| k.and_then(|k| rest.get(k)).map(|&p| route.points[p]);
                     let (a, b) = (point(place.checked_sub(1)), point(Some(place)));
                     let start = match (&a, &b) {
-                        (Some(a), Some(b)) => std::array::from_fn(|j| 0.5 * (a.q[j] + b.q[j])),
+                        (Some(a), Some(b)) => JointVector::from_fn(|j| 0.5 * (a.q[j] + b.q[j])),
                         (Some(one), None) | (None, Some(one)) => one.q,
                         (None, None) => continue,
                     };

@@ -18,7 +18,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::route::{PENALTY, Route, Task};
-use super::space::{Point, Space, distance};
+use super::space::{Point, Space};
 use super::{TaskConfig, TaskError};
 use crate::progress::Progress;
 
@@ -151,7 +151,7 @@ fn roots(task: &Task<'_>, seed: u64) -> Vec<(usize, Point)> {
             let mut found: Vec<Point> = Vec::new();
             for q in &seeds {
                 if let Some(point) = task.space.project_free(&task.poses[pose], q)
-                    && found.iter().all(|f| distance(&f.q, &point.q) > 0.5)
+                    && found.iter().all(|f| f.q.distance(&point.q) > 0.5)
                     && found.len() < ROOTS
                 {
                     found.push(point);
@@ -203,7 +203,7 @@ fn spread(task: &Task<'_>, chart: &[Option<Point>]) -> f64 {
 }
 
 fn is_new(known: &[Point], point: &Point) -> bool {
-    known.len() < CHOICES && known.iter().all(|k| distance(&k.q, &point.q) > SAME)
+    known.len() < CHOICES && known.iter().all(|k| k.q.distance(&point.q) > SAME)
 }
 
 /// The order of the poses and the choice at each, by the travelling salesman.
@@ -233,7 +233,7 @@ fn order(
                 .flat_map(|p| choices[b].iter().map(move |q| (p, q)))
                 .map(|(p, q)| match task.space.is_reconfiguration(p, q) {
                     true => f64::INFINITY,
-                    false => distance(&p.q, &q.q),
+                    false => p.q.distance(&q.q),
                 })
                 .collect();
             Block::both_ways(cluster[a], cluster[b], choices[a].len(), costs)
@@ -245,8 +245,10 @@ fn order(
         Instance::new(&sizes, Costs::Blocks(blocks), Jump::Uniform(PENALTY), free_start)?;
     let budget = Budget::trials(trials_per_pose * visited.len() as u64);
     let tour = gtsp::solve(&instance, &budget, seed)?.tour;
-    let mut points: Vec<Point> =
-        choices.iter().map(|c| c.first().copied().unwrap_or(task.space.point([0.0; 8]))).collect();
+    let mut points: Vec<Point> = choices
+        .iter()
+        .map(|c| c.first().copied().unwrap_or(task.space.point(JointVector::new([0.0; 8]))))
+        .collect();
     let order: Vec<usize> = tour.clusters.iter().map(|&k| visited[k]).collect();
     for (&pose, &node) in order.iter().zip(&tour.nodes) {
         points[pose] = choices[pose][node];

@@ -158,25 +158,19 @@ impl<'a> Space<'a> {
         if shift.norm() > TOOL_JUMP || a.tool.rotation.angle_to(&b.tool.rotation) > TURN_JUMP {
             return true;
         }
-        distance(&a.q, &b.q) > SHORT && self.deviation_at(a, b, 0.5) > LINE_JUMP
+        a.q.distance(&b.q) > SHORT && self.deviation_at(a, b, 0.5) > LINE_JUMP
     }
 
     /// How far the tool is from the straight line between its places at both ends, `share` of the
     /// way along the straight joint motion. \[m\]
     pub(super) fn deviation_at(&self, a: &Point, b: &Point, share: f64) -> f64 {
-        let q = std::array::from_fn(|j| a.q[j] + share * (b.q[j] - a.q[j]));
-        let at = self.point(q).tool.translation.vector - a.tool.translation.vector;
+        let at =
+            self.point(a.q.lerp(&b.q, share)).tool.translation.vector - a.tool.translation.vector;
         let along = b.tool.translation.vector - a.tool.translation.vector;
         let length = along.norm_squared();
         let t = if length > 0.0 { (at.dot(&along) / length).clamp(0.0, 1.0) } else { 0.0 };
         (at - along * t).norm()
     }
-}
-
-/// Euclidean distance of two joint vectors. \[rad\]
-#[inline]
-pub(super) fn distance(a: &JointVector, b: &JointVector) -> f64 {
-    (0..MAX_DOF).map(|j| (a[j] - b[j]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The tool seen from the pose: x, y, z \[m\], the tilt of its z axis about x and y and its turn

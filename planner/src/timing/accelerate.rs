@@ -104,14 +104,14 @@ fn along(knots: &[PlanKnot]) -> Run {
             length: half,
             start: a.q,
             slope: a.v,
-            bend: std::array::from_fn(|j| bend(j).0),
+            bend: JointVector::from_fn(|j| bend(j).0),
             source: [at, at + 0.5],
         };
         let second = Piece {
             length: half,
             start: first.at(half),
             slope: first.slope_at(half),
-            bend: std::array::from_fn(|j| bend(j).1),
+            bend: JointVector::from_fn(|j| bend(j).1),
             source: [at + 0.5, at + 1.0],
         };
         run.pieces.extend([first, second]);

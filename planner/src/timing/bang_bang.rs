@@ -40,10 +40,10 @@ mod tests {
 
     #[test]
     fn slowest_joint_sets_the_time_and_no_joint_exceeds_its_velocity() {
-        let mut velocity = [0.0; MAX_DOF];
+        let mut velocity = JointVector::ZERO;
         velocity[0] = 2.0;
         velocity[1] = 3.6;
-        let mut path = vec![[0.0; MAX_DOF]; 4];
+        let mut path = vec![JointVector::ZERO; 4];
         path[1][0] = 1.0;
         path[1][1] = -0.5;
         path[2][0] = 1.0 + 1e-13;

@@ -178,7 +178,7 @@ mod tests {
     fn lane(values: &[f64]) -> JointVector {
         let mut all = [0.0; MAX_DOF];
         all[..values.len()].copy_from_slice(values);
-        all
+        JointVector::new(all)
     }
 
     fn time(intervals: &[Interval], x: &[f64]) -> f64 {

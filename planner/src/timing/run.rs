@@ -31,21 +31,21 @@ impl Piece {
     /// A straight line.
     #[must_use]
     pub fn line(a: &JointVector, b: &JointVector, source: [f64; 2]) -> Self {
-        let length = distance(a, b);
-        let slope = std::array::from_fn(|j| (b[j] - a[j]) / length);
-        Self { length, start: *a, slope, bend: [0.0; MAX_DOF], source }
+        let length = a.distance(b);
+        let slope = JointVector::from_fn(|j| (b[j] - a[j]) / length);
+        Self { length, start: *a, slope, bend: JointVector::ZERO, source }
     }
 
     /// The position at s.
     #[must_use]
     pub fn at(&self, s: f64) -> JointVector {
-        std::array::from_fn(|j| self.start[j] + s * (self.slope[j] + 0.5 * s * self.bend[j]))
+        JointVector::from_fn(|j| self.start[j] + s * (self.slope[j] + 0.5 * s * self.bend[j]))
     }
 
     /// dq/ds at s.
     #[must_use]
     pub fn slope_at(&self, s: f64) -> JointVector {
-        std::array::from_fn(|j| self.slope[j] + s * self.bend[j])
+        JointVector::from_fn(|j| self.slope[j] + s * self.bend[j])
     }
 
     /// The first or the second part of it, cut at a share of its length.

@@ -162,7 +162,7 @@ fn place(cells: &[Cell], x: &[f64], from_ns: u64) -> (Vec<Timed>, Vec<usize>) {
             let knot = Timed {
                 time_ns: from_ns + time_ns as u64,
                 q: if i == 0 { piece.start } else { piece.at(s) },
-                v: piece.slope_at(s).map(|slope| slope * rate),
+                v: JointVector::new(piece.slope_at(s).map(|slope| slope * rate)),
                 source: piece.source[0],
             };
             push(knot, i);
@@ -173,7 +173,7 @@ fn place(cells: &[Cell], x: &[f64], from_ns: u64) -> (Vec<Timed>, Vec<usize>) {
         let end = Timed {
             time_ns: from_ns + (time * 1e9).ceil() as u64,
             q: piece.at(piece.length),
-            v: [0.0; MAX_DOF],
+            v: JointVector::ZERO,
             source: piece.source[1],
         };
         push(end, count);
@@ -186,7 +186,7 @@ fn goes_on(a: &Cell, b: &Cell, before: f64, after: f64, x: f64) -> bool {
     if a.index != b.index {
         return false;
     }
-    let straight = a.piece.bend == [0.0; MAX_DOF];
+    let straight = a.piece.bend == JointVector::ZERO;
     // An s̈ this small changes ṡ by nothing within a step.
     let still = |u: f64| u.abs() * a.piece.length < 1e-12 * x;
     let same = (before - after).abs() <= 1e-9 * before.abs().max(after.abs());

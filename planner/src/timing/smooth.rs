@@ -65,16 +65,16 @@ pub fn smooth(
 /// The parabola around point `i`, from `reach` before it to `reach` after it, in two halves.
 fn blend(points: &[JointVector], legs: &[f64], i: usize, reach: f64) -> [Piece; 2] {
     let unit = |a: &JointVector, b: &JointVector, length: f64| -> JointVector {
-        std::array::from_fn(|j| (b[j] - a[j]) / length)
+        JointVector::from_fn(|j| (b[j] - a[j]) / length)
     };
     let before = unit(&points[i - 1], &points[i], legs[i - 1]);
     let after = unit(&points[i], &points[i + 1], legs[i]);
     let at = i as f64;
     let whole = Piece {
         length: 2.0 * reach,
-        start: std::array::from_fn(|j| points[i][j] - reach * before[j]),
+        start: JointVector::from_fn(|j| points[i][j] - reach * before[j]),
         slope: before,
-        bend: std::array::from_fn(|j| (after[j] - before[j]) / (2.0 * reach)),
+        bend: JointVector::from_fn(|j| (after[j] - before[j]) / (2.0 * reach)),
         source: [at - reach / legs[i - 1], at],
     };
     let mut halves = [whole.part(0.0, 0.5), whole.part(0.5, 1.0)];
@@ -97,7 +97,7 @@ mod tests {
     fn at(x: f64, y: f64) -> JointVector {
         let mut q = [0.0; MAX_DOF];
         (q[0], q[1]) = (x, y);
-        q
+        JointVector::new(q)
     }
 
     #[test]
@@ -133,7 +133,7 @@ mod tests {
                             (0..2).map(|j| (q[j] - w[0][j]) * (w[1][j] - w[0][j])).sum();
                         let share = (along / (leg * leg)).clamp(0.0, 1.0);
                         let foot: JointVector =
-                            std::array::from_fn(|j| w[0][j] + share * (w[1][j] - w[0][j]));
+                            JointVector::from_fn(|j| w[0][j] + share * (w[1][j] - w[0][j]));
                         distance(&q, &foot)
                     })
                     .fold(f64::INFINITY, f64::min);
@@ -153,11 +153,11 @@ mod tests {
         let runs = smooth(&points, &|_, _| true);
         assert_eq!(runs.len(), 1);
         // Straight bits are left only in the first and the last leg.
-        let straight = runs[0].pieces.iter().filter(|p| p.bend == [0.0; MAX_DOF]).count();
+        let straight = runs[0].pieces.iter().filter(|p| p.bend == JointVector::ZERO).count();
         assert_eq!(straight, 2);
         // The circle's curvature is 1.
-        for p in runs[0].pieces.iter().filter(|p| p.bend != [0.0; MAX_DOF]) {
-            let bend = distance(&p.bend, &[0.0; MAX_DOF]);
+        for p in runs[0].pieces.iter().filter(|p| p.bend != JointVector::ZERO) {
+            let bend = distance(&p.bend, &JointVector::new([0.0; MAX_DOF]));
             assert!((bend - 1.0).abs() < 0.01, "{bend}");
         }
     }

@@ -1,7 +1,9 @@
 //! Where the robot stands before the object, and how its held joints are set.
 
 use nalgebra::{Isometry3, Point3, Rotation2, Vector2, Vector3};
-use nullsweep_robot::{Arm, ArmError, CollisionShape, Geometry, MAX_DOF, Robot, Solutions, Tool};
+use nullsweep_robot::{
+    Arm, ArmError, CollisionShape, Geometry, JointVector, Robot, Solutions, Tool,
+};
 use nullsweep_surface::patches::Patch;
 use nullsweep_surface::scan::Scan;
 use rayon::prelude::*;
@@ -94,7 +96,7 @@ impl StanceSearch {
             return search;
         }
         let mut poses = vec![Isometry3::identity(); robot.links().len()];
-        arm.link_poses(&[0.0; MAX_DOF], &mut poses);
+        arm.link_poses(&JointVector::ZERO, &mut poses);
         let pivot = poses[arm.moving_links()[0]].translation.vector;
         let contact = tool.contact_in_tip();
         let reach = (0..REACH_SAMPLES)
@@ -102,7 +104,7 @@ impl StanceSearch {
             .fold(0.0, f64::max);
         let share =
             |i: u32| NEAREST + (FARTHEST - NEAREST) * f64::from(i) / f64::from(DISTANCES - 1);
-        let turns_all_round = arm.jacobian(&[0.0; MAX_DOF])[(5, 0)].abs() > 0.99
+        let turns_all_round = arm.jacobian(&JointVector::ZERO)[(5, 0)].abs() > 0.99
             && arm.limits()[0].upper - arm.limits()[0].lower > ALL_ROUND;
         Self {
             pivot: [pivot.x, pivot.y],

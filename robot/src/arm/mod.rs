@@ -12,7 +12,7 @@ use crate::fingerprint::fingerprint;
 use crate::ik::{InverseKinematics, Numeric, RedundantJoint, Solvers, spread_over};
 use crate::limits::{JointLimits, LimitsError, apply_toml};
 use crate::urdf::{Joint, JointKind, Model, Robot};
-use crate::{JointVector, MAX_DOF, pr2};
+use crate::{Continuous, JointVector, MAX_DOF, pr2};
 use assembly::{Motion, Placement, Values, build_chain, build_placements, motion_of};
 
 pub use error::ArmError;
@@ -118,6 +118,12 @@ impl Arm {
     #[must_use]
     pub fn limits(&self) -> &[JointLimits] {
         &self.limits
+    }
+
+    /// Which joints turn without end.
+    #[must_use]
+    pub fn continuous(&self) -> Continuous {
+        Continuous::of(&self.limits)
     }
 
     /// Whether a joint of the chain turns; else it slides.
@@ -253,7 +259,7 @@ impl Arm {
             let middle = if lower.is_finite() { 0.5 * (lower + upper) } else { 0.0 };
             home[i] = pr2::ready(name).filter(|_| self.is_pr2()).unwrap_or(middle);
         }
-        home
+        JointVector::new(home)
     }
 
     /// The k-th joint vector of a fixed sequence that fills the margined ranges evenly; continuous

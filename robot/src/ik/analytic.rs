@@ -113,7 +113,7 @@ impl Analytic {
         reach: f64,
         mut found: impl FnMut(u8, JointVector),
     ) {
-        let mut zero = [0.0; MAX_DOF];
+        let mut zero = JointVector::ZERO;
         self.hold(&mut zero, redundancy);
         let (tip, axes) = self.chain.axes(&zero);
         let motion = target * tip.inverse();
@@ -174,7 +174,7 @@ impl Analytic {
             // Damped by the error itself: still quadratic, and steady near a singularity.
             let damping = (DAMPING * error.norm_squared()).max(1e-16);
             let step = damped_step(&jacobian, &free, &error, damping);
-            for (value, step) in q.iter_mut().zip(step) {
+            for (value, step) in q.iter_mut().zip(&step) {
                 *value += step;
             }
             if q.iter().zip(seed).any(|(a, b)| (a - b).abs() > NEAR) {
@@ -218,7 +218,7 @@ impl InverseKinematics for Analytic {
         let reserve = if self.is_exact() { EXACT } else { NEAR };
         let mut settled = 0u8;
         for &reach in self.reaches() {
-            let near = [0.0; MAX_DOF];
+            let near = JointVector::ZERO;
             self.postures(target, redundancy, None, &near, reach, |bits, mut q| {
                 if settled & 1 << bits != 0 {
                     return;
@@ -285,7 +285,7 @@ fn shape(
     most: f64,
 ) -> Option<Shape> {
     let shape = |value: f64| {
-        let mut q = [0.0; MAX_DOF];
+        let mut q = JointVector::ZERO;
         if let Some(held) = held {
             q[held] = value;
         }

@@ -107,7 +107,7 @@ impl Folds {
             // Across the nearest singularity: along the direction that moves the tip least.
             let least = self.least_direction(jacobian);
             for reach in [0.4, -0.4] {
-                starts.push(std::array::from_fn(|i| q[i] + reach * least[i]));
+                starts.push(JointVector::from_fn(|i| q[i] + reach * least[i]));
             }
         }
         starts
@@ -122,7 +122,7 @@ impl Folds {
         for (i, &column) in self.columns.iter().enumerate() {
             direction[column] = eigen.eigenvectors[(i, k)];
         }
-        direction
+        JointVector::new(direction)
     }
 
     fn square(&self, jacobian: &Jacobian) -> Matrix6<f64> {
@@ -162,7 +162,7 @@ pub(super) fn self_motion(chain: &Chain) -> [f64; MAX_DOF] {
 
 /// The k-th configuration of a sequence that fills −π … π of each joint evenly.
 fn sample(chain: &Chain, k: usize) -> JointVector {
-    std::array::from_fn(|i| if i < chain.dof() { PI * (2.0 * spread(k, i) - 1.0) } else { 0.0 })
+    JointVector::from_fn(|i| if i < chain.dof() { PI * (2.0 * spread(k, i) - 1.0) } else { 0.0 })
 }
 
 /// The k-th number of the van der Corput sequence to the base of a joint (Halton's sequence over

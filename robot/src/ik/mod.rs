@@ -138,5 +138,5 @@ pub(crate) fn spread_over(ranges: &[(f64, f64)], k: usize) -> JointVector {
         let (lower, upper) = if lower.is_finite() { (lower, upper) } else { (-PI, PI) };
         q[i] = lower + (upper - lower) * folds::spread(k, i);
     }
-    q
+    JointVector::new(q)
 }

@@ -12,8 +12,7 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Vector3, Vector6};
 
 use super::folds::{Folds, MOST_FOLDS, same, self_motion};
-use super::spread_over;
-use super::{Branch, InverseKinematics, Solution, Solutions};
+use super::{Branch, InverseKinematics, Solution, Solutions, spread_over};
 use crate::chain::Chain;
 use crate::limits::{JointLimits, unwrap_near, wrap};
 use crate::{Jacobian, JointVector, MAX_DOF};
@@ -369,7 +368,7 @@ pub(super) fn damped_step(
         let known: f64 = (i + 1..6).map(|k| l[k][i] * x[k]).sum();
         x[i] = (x[i] - known) * inverse[i];
     }
-    std::array::from_fn(|c| match free[c] {
+    JointVector::from_fn(|c| match free[c] {
         true => (0..6).map(|i| columns[c][i] * x[i]).sum(),
         false => 0.0,
     })

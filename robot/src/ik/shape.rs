@@ -48,7 +48,7 @@ impl Pr2Shape {
         if chain.dof() != 7 || chain.steps.iter().any(|s| s.prismatic) {
             return None;
         }
-        let (tip, axes) = chain.axes(&[0.0; MAX_DOF]);
+        let (tip, axes) = chain.axes(&JointVector::new([0.0; MAX_DOF]));
         let u: Vec<Vector3<f64>> = axes.iter().map(|a| a.direction).collect();
         if (0..6).any(|i| u[i].dot(&u[i + 1]).abs() > TOLERANCE) {
             return None;
@@ -136,7 +136,7 @@ impl Pr2Shape {
                 if self.continuous[i] { wrap(angle) } else { unwrap_near(angle, self.middle[i]) };
         }
         q[given.0] = given.1;
-        q
+        JointVector::new(q)
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) fn data(path: &str) -> Option<PathBuf> {
 
 /// Uniform in the margined limits, continuous joints in ±π.
 pub(crate) fn random(arm: &Arm, rng: &mut impl Rng) -> JointVector {
-    let mut q = [0.0; 8];
+    let mut q = JointVector::ZERO;
     for (q, &(lower, upper)) in q.iter_mut().zip(arm.margined_limits()) {
         *q = if lower.is_finite() {
             rng.random_range(lower..upper)
@@ -29,10 +29,13 @@ pub(crate) fn random(arm: &Arm, rng: &mut impl Rng) -> JointVector {
 }
 
 /// Largest difference of two configurations, by whole turns. \[rad\]
-pub(crate) fn farthest(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn farthest<'a>(
+    a: impl IntoIterator<Item = &'a f64>,
+    b: impl IntoIterator<Item = &'a f64>,
+) -> f64 {
     let apart = |(a, b): (&f64, &f64)| {
         let d = (a - b).rem_euclid(std::f64::consts::TAU);
         d.min(std::f64::consts::TAU - d)
     };
-    a.iter().zip(b).map(apart).fold(0.0, f64::max)
+    a.into_iter().zip(b).map(apart).fold(0.0, f64::max)
 }

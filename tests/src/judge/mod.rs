@@ -165,7 +165,7 @@ impl Judge {
 
         let elapsed = (s.sequence - last.sequence) as f64 * self.rules.period_ns as f64 * 1e-9;
         let rates: JointVector =
-            std::array::from_fn(|j| (positions[j] - last.positions[j]) / elapsed);
+            JointVector::from_fn(|j| (positions[j] - last.positions[j]) / elapsed);
         // When the executor leaves a fault, it begins again from where the arm was measured, and
         // gets there without a jump.
         let idle = mode.is_some_and(is_idle);

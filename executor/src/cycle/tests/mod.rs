@@ -4,22 +4,22 @@ mod faults;
 mod motion;
 mod tables;
 
+use EventKind::{Aborted, Accepted, Finished, Rejected, Started, Superseded};
 use nullsweep_ipc_types::{
     EventKind, Fault, Interpolation, JoinRule, Mode, PlanId, Reason, Verdict, status,
 };
 
+use crate::JointVector;
 use crate::cycle::{Event, Measured, Order};
 use crate::guard::tests::pr2;
 use crate::testing::{HOME, MS, Sim, cubic, joining, moved, plan, plan_with};
-use crate::{Joints, MAX_DOF};
-use EventKind::{Aborted, Accepted, Finished, Rejected, Started, Superseded};
 
 fn id(number: u64) -> PlanId {
     PlanId { epoch: 1000, number }
 }
 
 /// Joint 0 there and on: 0.4 rad in 0.4 s, knots each 50 ms.
-fn line(from: Joints) -> Vec<(u64, Joints)> {
+fn line(from: JointVector) -> Vec<(u64, JointVector)> {
     (0..=8u32).map(|i| (u64::from(i) * 50 * MS, moved(from, 0, 0.05 * f64::from(i)))).collect()
 }
 

@@ -23,7 +23,7 @@ fn runs_a_plan_to_its_exact_end() {
         assert_eq!(sim.last, Some(points[8].1), "the last knot is hit to the bit");
         sim.run(50);
         assert_eq!(sim.last, Some(points[8].1));
-        assert_eq!(sim.last_v, [0.0; MAX_DOF]);
+        assert_eq!(sim.last_v, JointVector::ZERO);
     }
 }
 

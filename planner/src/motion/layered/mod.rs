@@ -19,10 +19,10 @@ mod edges;
 use std::collections::HashMap;
 
 use edges::{Edges, Kind};
-use nullsweep_robot::{JointVector, MAX_DOF};
+use nullsweep_robot::{Continuous, JointVector};
 use rayon::prelude::*;
 
-use crate::cost::{Cost, displacement};
+use crate::cost::Cost;
 use crate::roadmap::Blocked;
 use crate::workcell::Sample;
 
@@ -111,7 +111,7 @@ const NEAR: f64 = 0.02;
 /// into or out of which no motion is found, is left out; `left_out` is called with it.
 pub fn shortest<C: Cost, M: Moves>(
     cost: &C,
-    continuous: &[bool; MAX_DOF],
+    continuous: Continuous,
     source: &JointVector,
     layers: &[Vec<Sample>],
     moves: &M,
@@ -193,7 +193,7 @@ struct Key {
 /// What is given.
 struct Problem<'a, C, M> {
     cost: &'a C,
-    continuous: &'a [bool; MAX_DOF],
+    continuous: Continuous,
     source: &'a JointVector,
     layers: &'a [Vec<Sample>],
     moves: &'a M,
@@ -388,7 +388,7 @@ impl<C: Cost, M: Moves> Problem<'_, C, M> {
         let mut edges = Edges::new(width, rows.len() * width, lift);
         for (q, from) in rows {
             for to in &self.layers[to] {
-                let straight = self.cost.of(&displacement(self.continuous, q, &to.q)) as f32;
+                let straight = self.cost.of(&self.continuous.displacement(q, &to.q)) as f32;
                 let tracked = surface && from.is_some_and(|f| f.branch == to.branch);
                 let kind = if tracked { Kind::Track } else { Kind::Jump };
                 edges.push(kind, straight);

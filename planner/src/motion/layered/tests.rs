@@ -18,7 +18,7 @@ fn surcharge(from: &Sample, to: &Sample) -> f64 {
 }
 
 fn straight(a: &JointVector, b: &JointVector) -> f64 {
-    Effort.of(&displacement(&[false; MAX_DOF], a, b))
+    Effort.of(&a.displacement(b))
 }
 
 impl Moves for Hidden {
@@ -41,7 +41,7 @@ impl Moves for Hidden {
         extra.is_finite().then(|| Motion { cost: straight(&from.q, &to.q) + extra, path: () })
     }
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
-        let start = from.map_or([0.0; MAX_DOF], |s| s.q);
+        let start = from.map_or(JointVector::ZERO, |s| s.q);
         Some(Motion { cost: self.jump_estimate(straight(&start, &to.q)), path: () })
     }
     fn lifts(&self, _: &Sample) -> bool {
@@ -57,7 +57,7 @@ fn layers(rng: &mut ChaCha8Rng, count: usize) -> (Vec<Vec<Sample>>, Vec<Link>) {
         .map(|_| {
             (0..rng.random_range(1..6))
                 .map(|_| {
-                    let mut q = [0.0; MAX_DOF];
+                    let mut q = JointVector::ZERO;
                     q[..3].fill_with(|| rng.random_range(-2.0..2.0));
                     let branch = Branch(rng.random_range(0..2));
                     Sample { q, branch, redundancy: q[0], heading: 0.0 }
@@ -105,8 +105,8 @@ fn brute_force(layers: &[Vec<Sample>], moves: &Hidden) -> f64 {
 
 fn search(layers: &[Vec<Sample>], moves: &Hidden) -> (LayeredPath<()>, Vec<usize>) {
     let mut left_out = Vec::new();
-    let source = [0.0; MAX_DOF];
-    let path = shortest(&Effort, &[false; MAX_DOF], &source, layers, moves, &mut |l| {
+    let source = JointVector::ZERO;
+    let path = shortest(&Effort, Continuous::default(), &source, layers, moves, &mut |l| {
         left_out.push(l);
     });
     (path, left_out)
@@ -162,7 +162,7 @@ impl Moves for Gates {
         unreachable!("no layers are linked along the surface")
     }
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
-        let start = from.map_or([0.0; MAX_DOF], |s| s.q);
+        let start = from.map_or(JointVector::ZERO, |s| s.q);
         let is_open = from.is_none() || opens(&start, &to.q);
         is_open.then(|| Motion { cost: 1.0 + straight(&start, &to.q), path: () })
     }
@@ -192,9 +192,10 @@ fn no_layer_is_left_out_that_some_path_visits() {
             reached = pair[1].iter().map(comes).collect();
         }
         let mut left_out = 0;
-        let source = [0.0; MAX_DOF];
-        let path =
-            shortest(&Effort, &[false; MAX_DOF], &source, &layers, &Gates, &mut |_| left_out += 1);
+        let source = JointVector::ZERO;
+        let path = shortest(&Effort, Continuous::default(), &source, &layers, &Gates, &mut |_| {
+            left_out += 1
+        });
         assert_eq!(path.layers.len() + left_out, layers.len());
         assert!(path.cost.is_finite());
         if reached.contains(&true) {
@@ -226,7 +227,7 @@ impl Moves for Trap {
         unreachable!("no track is blocked")
     }
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
-        let start = from.map_or([0.0; MAX_DOF], |s| s.q);
+        let start = from.map_or(JointVector::ZERO, |s| s.q);
         let goes = self.lifts(to) && from.is_none_or(|from| self.lifts(from));
         goes.then(|| Motion { cost: 1.0 + straight(&start, &to.q), path: () })
     }
@@ -247,8 +248,8 @@ fn the_layer_that_no_jump_leaves_is_left_out_not_those_behind_it() {
             layer.iter_mut().for_each(|s| (s.heading, s.branch) = (l as f64, Branch(0)));
         }
         let mut left_out = Vec::new();
-        let source = [0.0; MAX_DOF];
-        let path = shortest(&Effort, &[false; MAX_DOF], &source, &layers, &Trap, &mut |l| {
+        let source = JointVector::ZERO;
+        let path = shortest(&Effort, Continuous::default(), &source, &layers, &Trap, &mut |l| {
             left_out.push(l)
         });
         assert_eq!((path.layers, left_out), (vec![0, 2, 3, 4], vec![1]));

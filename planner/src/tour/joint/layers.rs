@@ -114,7 +114,7 @@ impl<'a, C: Cost> Layers<'a, C> {
 
 #[cfg(test)]
 mod tests {
-    use nullsweep_robot::{Branch, MAX_DOF};
+    use nullsweep_robot::{Branch, Continuous, JointVector, MAX_DOF};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -127,7 +127,7 @@ mod tests {
             let mut q = [0.0; MAX_DOF];
             q[..7].fill_with(|| rng.random_range(-3.0..3.0));
             let branch = Branch(rng.random_range(0..2));
-            Sample { q, branch, redundancy: 0.0, heading: (i / 5) as f64 }
+            Sample { q: JointVector::new(q), branch, redundancy: 0.0, heading: (i / 5) as f64 }
         };
         Cluster::new((0..count).map(|i| sample(i, rng)).collect())
     }
@@ -139,7 +139,7 @@ mod tests {
         continuous[4] = true;
         for _ in 0..20 {
             let clusters: Vec<Cluster> = (0..6).map(|_| cluster(&mut rng)).collect();
-            let metric = &Metric::new(&Effort, continuous, 7, 2.5);
+            let metric = &Metric::new(&Effort, Continuous::new(continuous), 7, 2.5);
             let layers = Layers {
                 metric,
                 clusters: clusters.iter().collect(),

@@ -1,9 +1,9 @@
 //! Clusters of joint vectors and the cost from one to another.
 
-use nullsweep_robot::{Branch, JointVector, MAX_DOF};
+use nullsweep_robot::{Branch, Continuous, JointVector, MAX_DOF};
 use wide::f32x8;
 
-use crate::cost::{Cost, displacement};
+use crate::cost::Cost;
 use crate::workcell::Sample;
 
 /// Lanes that a group of eight samples takes: their joints, then their branch.
@@ -72,7 +72,7 @@ impl Cluster {
 /// The cost of the straight joint motion between two samples, and of a change of branch.
 pub struct Metric<'a, C> {
     cost: &'a C,
-    continuous: [bool; MAX_DOF],
+    continuous: Continuous,
     /// A whole turn of each continuous joint, infinite for the others.
     period: [f32; MAX_DOF],
     dof: usize,
@@ -84,9 +84,9 @@ impl<'a, C: Cost> Metric<'a, C> {
     /// For an arm of `dof` joints. `change` is added where the branches of two samples differ: 0 in
     /// the paper's model, else what leaving the surface costs.
     #[must_use]
-    pub fn new(cost: &'a C, continuous: [bool; MAX_DOF], dof: usize, change: f64) -> Self {
+    pub fn new(cost: &'a C, continuous: Continuous, dof: usize, change: f64) -> Self {
         let turn = std::f32::consts::TAU;
-        let period = continuous.map(|c| if c { turn } else { f32::INFINITY });
+        let period = std::array::from_fn(|j| if continuous.is(j) { turn } else { f32::INFINITY });
         Self { cost, continuous, period, dof, change }
     }
 
@@ -100,7 +100,7 @@ impl<'a, C: Cost> Metric<'a, C> {
     /// The cost of the straight joint motion.
     #[must_use]
     pub fn straight(&self, a: &JointVector, b: &JointVector) -> f64 {
-        self.cost.of(&displacement(&self.continuous, a, b))
+        self.cost.of(&self.continuous.displacement(a, b))
     }
 
     /// Lowers `out`, the labels of `to` from its group `first` on, to what the labels of `from`

@@ -213,7 +213,7 @@ fn promising(cluster: &Cluster, most: usize, value: impl Fn(usize) -> f32) -> Ve
 
 #[cfg(test)]
 mod tests {
-    use nullsweep_robot::{Branch, MAX_DOF};
+    use nullsweep_robot::{Branch, Continuous, JointVector, MAX_DOF};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -235,7 +235,7 @@ mod tests {
                 q[2] = 0.1 * x * y + r;
                 q[3] = first + heading * 0.8 + (1.0 - 0.2 * y) * r;
                 q[..4].iter_mut().for_each(|q| *q += rng.random_range(-0.02..0.02));
-                Sample { q, branch: Branch(0), redundancy: r, heading }
+                Sample { q: JointVector::new(q), branch: Branch(0), redundancy: r, heading }
             };
             Cluster::new((0..40).map(|i| sample(i, rng)).collect())
         };
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn few_samples_in_turns_do_as_well_as_all_at_once() {
-        let metric = &Metric::new(&Effort, [false; MAX_DOF], 4, 0.0);
+        let metric = &Metric::new(&Effort, Continuous::default(), 4, 0.0);
         for seed in 0..2 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (clusters, adjacent) = grid(20, 5, &mut rng);
