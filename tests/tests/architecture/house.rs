@@ -1,0 +1,152 @@
+//! The plan of the house: every table that the rules go by. To allow something, allow it here.
+
+/// What a crate may depend on.
+pub(crate) enum May {
+    /// Just these crates of ours, by folder. One that is not needed any more is to be struck.
+    Import(&'static [&'static str]),
+    /// All of ours.
+    ImportAll,
+}
+
+/// A crate of ours: its folder, its dependencies, and those of its tests and benches besides.
+pub(crate) struct Crate {
+    pub(crate) dir: &'static str,
+    pub(crate) may: May,
+    pub(crate) dev: &'static [&'static str],
+}
+
+const fn leaf(dir: &'static str) -> Crate {
+    with(dir, &[])
+}
+
+const fn with(dir: &'static str, may: &'static [&'static str]) -> Crate {
+    Crate { dir, may: May::Import(may), dev: &[] }
+}
+
+/// Every crate of the repository.
+pub(crate) const CRATES: &[Crate] = &[
+    leaf("ipc-types"),
+    leaf("robot"),
+    leaf("planner/gtsp"),
+    leaf("planner/surface"),
+    with("planner/collision", &["robot"]),
+    with(
+        "planner",
+        &["ipc-types", "robot", "planner/gtsp", "planner/surface", "planner/collision"],
+    ),
+    leaf("planner/report"),
+    with(
+        "planner/experiment",
+        &[
+            "planner",
+            "planner/gtsp",
+            "planner/surface",
+            "planner/collision",
+            "planner/report",
+            "robot",
+        ],
+    ),
+    with(
+        "planner/cli",
+        &[
+            "planner",
+            "planner/gtsp",
+            "planner/surface",
+            "planner/collision",
+            "planner/report",
+            "planner/experiment",
+            "robot",
+            "ipc-types",
+        ],
+    ),
+    with("executor", &["ipc-types", "robot"]),
+    Crate { dir: "tests", may: May::ImportAll, dev: &[] },
+    with("pr2-bridge", &["ipc-types", "robot", "executor"]),
+];
+
+/// Crates that share the wire and nothing else: no way may lead from one to the other.
+pub(crate) const STRANGERS: &[(&str, &str)] = &[("planner", "executor")];
+
+/// Which of a crate's top-level modules may import which.
+pub(crate) enum Storeys {
+    /// Each module with all that it may import.
+    Table(&'static [(&'static str, &'static [&'static str])]),
+    /// From the bottom to the top: each may import all that stand before it.
+    Ladder(&'static [&'static str]),
+}
+
+/// The storeys of a crate, by the folder of its sources.
+pub(crate) const STOREYS: &[(&str, Storeys)] = &[
+    ("planner/src", Storeys::Table(PLANNER)),
+    ("planner/collision/src", Storeys::Ladder(COLLISION)),
+    ("planner/surface/src", Storeys::Ladder(SURFACE)),
+];
+
+/// What storey 3 may import, and, with storey 3 itself, storey 4.
+const BELOW_3: &[&str] = &["progress", "cost", "workcell", "plan", "roadmap", "sweep"];
+#[rustfmt::skip]
+const BELOW_4: &[&str] = &[
+    "progress", "cost", "workcell", "plan", "roadmap", "sweep",
+    "tour", "motion", "timing", "verify", "link",
+];
+
+const PLANNER: &[(&str, &[&str])] = &[
+    // 0
+    ("progress", &[]),
+    ("cost", &[]),
+    // 1
+    ("workcell", &["progress", "cost"]),
+    // 2
+    ("plan", &["progress", "cost", "workcell"]),
+    ("roadmap", &["progress", "cost", "workcell"]),
+    // 3: none imports another but sweep; what the search knows is kept from verify
+    ("sweep", &["progress", "cost", "workcell", "plan", "roadmap"]),
+    ("tour", BELOW_3),
+    ("motion", BELOW_3),
+    ("timing", BELOW_3),
+    ("verify", &["progress", "cost", "workcell", "plan", "sweep"]),
+    ("link", BELOW_3),
+    // 4: neither imports the other
+    ("pipeline", BELOW_4),
+    ("task", BELOW_4),
+];
+
+#[rustfmt::skip]
+const COLLISION: &[&str] = &[
+    "rules", "frame", "mesh", "srdf", "solid", "spheres", "sieve", "field", "bodies", "parts",
+    "scene", "shapes", "motion", "exact", "pairs", "never", "world", "check", "proof", "clearance",
+];
+
+const SURFACE: &[&str] = &["grid", "fit", "scan", "simulate", "sheet", "patches"];
+
+/// Modules that must not name anything of others: folder of the sources, module, the others.
+pub(crate) const APART: &[(&str, &str, &[&str])] = &[
+    // What is wrong in the search must not be wrong in the verification too.
+    ("planner/src", "verify", &["roadmap", "tour", "motion", "pipeline", "task"]),
+    ("planner/src", "roadmap", &["verify"]),
+    ("planner/src", "tour", &["verify"]),
+    ("planner/src", "motion", &["verify"]),
+];
+
+/// Libraries of others, and the only folders that may name them.
+pub(crate) const ROOMS: &[(&str, &[&str])] = &[
+    ("parry3d-f64", &["planner/collision"]),
+    ("clap", &["planner/cli", "executor", "tests", "pr2-bridge"]),
+    ("indicatif", &["planner/cli"]),
+    ("plotly", &["planner/report", "tests"]),
+    ("plotters", &["planner/experiment"]),
+    ("comfy-table", &["planner/cli", "planner/experiment", "tests"]),
+];
+
+/// Enums that tell a refusal: a test names each of their variants.
+pub(crate) const REFUSALS: &[&str] = &["ViolationKind", "Reason", "Fault"];
+
+/// Programs whose subcommands the documents may name.
+pub(crate) const PROGRAMS: &[&str] = &["planner", "executor", "pr2-bridge"];
+
+/// The most lines of a file.
+pub(crate) const FILE_LINES: usize = 450;
+/// The most lines of a function, from its signature to its last brace.
+pub(crate) const FUNCTION_LINES: usize = 100;
+/// The most parameters of a function beside `self`.
+pub(crate) const PARAMETERS: usize = 6;
