@@ -16,7 +16,7 @@ pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
     let mut report = |knot, kind, detail| found.push(Violation { knot, kind, detail });
     for (k, knot) in plan.knots.iter().enumerate() {
         if knot.q.iter().chain(&knot.v).any(|v| !v.is_finite()) {
-            report(k, ViolationKind::NotFinite, format!("{:?}", knot.q));
+            report(k, ViolationKind::NotFinite, format!("q {:?}, v {:?}", *knot.q, *knot.v));
         }
         let before = k.checked_sub(1).map(|b| &plan.knots[b]);
         let rises = before.map_or(knot.time_ns == 0, |b| knot.time_ns > b.time_ns);
@@ -75,7 +75,7 @@ fn sampled(plan: &Plan, arm: &Arm) -> Vec<Violation> {
         }
         let Some(from) = plan.knots.get(k - 1).filter(|_| k < plan.knots.len()) else { break };
         let curve = plan.curve(k);
-        let now = curve.at((time_ns - from.time_ns) as f64 * 1e-9 / curve.seconds());
+        let now = curve.at(time_ns.saturating_sub(from.time_ns) as f64 * 1e-9 / curve.seconds());
         if let [.., two, one] = last[..] {
             for (j, name) in arm.joint_names().iter().enumerate() {
                 let limits = &arm.limits()[j];
