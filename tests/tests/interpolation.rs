@@ -1,14 +1,10 @@
 //! Planner and executor move the arm between two knots by code of their own. Here both follow the
 //! same random plans: what the planner has verified is what the executor commands.
 
-use nullsweep_executor::{Joints, PlanKnot, reach, sample, top_speed};
+use nullsweep_executor::{JointVector, PlanKnot, reach, sample, top_speed};
 use nullsweep_ipc_types::Interpolation;
-use nullsweep_planner::cost::CostKind;
-use nullsweep_planner::formulation::Method;
-use nullsweep_planner::plan::{self, FORMAT, Plan};
-use nullsweep_planner::timing::Profile;
-use nullsweep_planner::tool::Tool;
-use nullsweep_robot::MAX_DOF;
+use nullsweep_planner::plan::{self, CostKind, FORMAT, Method, Plan, Profile};
+use nullsweep_robot::{MAX_DOF, Tool};
 use proptest::prelude::*;
 
 /// What positions may differ by; the most that was seen is 5.3e-15. \[rad\]
@@ -17,19 +13,19 @@ const POSITION: f64 = 2e-14;
 const VELOCITY: f64 = 1e-14;
 
 /// A joint's position \[rad\] and velocity \[rad/s\], its lanes differing.
-fn joints() -> impl Strategy<Value = (Joints, Joints)> {
+fn joints() -> impl Strategy<Value = (JointVector, JointVector)> {
     let q = prop::array::uniform8(-4.0..4.0f64);
     // Also at rest, as plans begin and end.
     let v = prop_oneof![4 => prop::array::uniform8(-4.0..4.0f64), 1 => Just([0.0; MAX_DOF])];
-    (q, v)
+    (q.prop_map(JointVector::new), v.prop_map(JointVector::new))
 }
 
 /// A plan through these joint vectors; before each but the first one, so many nanoseconds.
-fn plan(profile: Profile, knots: &[((Joints, Joints), u64)]) -> Plan {
+fn plan(profile: Profile, knots: &[((JointVector, JointVector), u64)]) -> Plan {
     let mut now = 0;
     let knots = knots.iter().enumerate().map(|(k, &((q, v), length))| {
         now += if k == 0 { 0 } else { length };
-        let v = if profile == Profile::Velocity { [0.0; MAX_DOF] } else { v };
+        let v = if profile == Profile::Velocity { JointVector::ZERO } else { v };
         plan::PlanKnot { time_ns: now, q, v, line: None, patch: None }
     });
     Plan {
@@ -56,7 +52,7 @@ fn plan(profile: Profile, knots: &[((Joints, Joints), u64)]) -> Plan {
 fn received(plan: &Plan) -> (Interpolation, Vec<PlanKnot>) {
     let (header, knots) = plan.message_parts().expect("short enough");
     let kind = Interpolation::from_wire(header.interpolation).expect("a kind");
-    let lanes = |wire: &[f64]| std::array::from_fn(|j| wire[j]);
+    let lanes = |wire: &[f64]| JointVector::from_fn(|j| wire[j]);
     let knots = knots.iter().map(|k| PlanKnot {
         time: k.time_from_start_ns as f64,
         q: lanes(&k.positions),
@@ -66,11 +62,11 @@ fn received(plan: &Plan) -> (Interpolation, Vec<PlanKnot>) {
     (kind, knots.collect())
 }
 
-fn apart(a: &Joints, b: &Joints) -> f64 {
+fn apart(a: &JointVector, b: &JointVector) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn bits(q: &Joints) -> [u64; MAX_DOF] {
+fn bits(q: &JointVector) -> [u64; MAX_DOF] {
     q.map(f64::to_bits)
 }
 

@@ -1,7 +1,7 @@
 //! Ways to collide.
 
 use nalgebra::{Isometry3, Vector3};
-use nullsweep_planner::collision::{Obstacle, World};
+use nullsweep_collision::{Obstacle, World};
 use nullsweep_planner::plan::Plan;
 use nullsweep_robot::JointVector;
 

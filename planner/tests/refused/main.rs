@@ -5,9 +5,8 @@ mod pad;
 mod stage;
 
 use ViolationKind::{Acceleration, Collision, NotFinite, SoftLimit, TimeOrder, Velocity};
-use nullsweep_planner::collision::World;
-use nullsweep_planner::plan::{Continues, Plan, PlanKnot};
-use nullsweep_planner::timing::Profile;
+use nullsweep_collision::World;
+use nullsweep_planner::plan::{Continues, Plan, PlanKnot, Profile};
 use nullsweep_planner::verify::ViolationKind;
 use stage::{detour, joint, judge, on_the_line, posture, retimed, spoilt, stage, stretched};
 

@@ -3,23 +3,22 @@
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
-use nullsweep_planner::collision::{Obstacle, ObstacleShape, Options, World};
-use nullsweep_planner::cost::{CostKind, velocities};
-use nullsweep_planner::formulation::{FormulationConfig, Method};
-use nullsweep_planner::graph::GraphConfig;
-use nullsweep_planner::patches::PatchConfig;
+use nullsweep_collision::{Obstacle, ObstacleShape, Options, World};
+use nullsweep_planner::cost::velocities;
 use nullsweep_planner::pipeline::{Job, StanceChoice, run};
-use nullsweep_planner::plan::{Plan, PlanKnot};
+use nullsweep_planner::plan::{CostKind, Method, Plan, PlanKnot, Profile};
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::reach::Workcell;
-use nullsweep_planner::scan::{CleanConfig, Placement, Scan, clean_region, place};
-use nullsweep_planner::simulate;
-use nullsweep_planner::stance::Stance;
-use nullsweep_planner::surface::Surface;
-use nullsweep_planner::timing::{Limits, Profile, accelerate, bang_bang};
-use nullsweep_planner::tool::Tool;
+use nullsweep_planner::roadmap::GraphConfig;
+use nullsweep_planner::timing::{Limits, accelerate, bang_bang};
+use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::verify::{Verification, verify};
-use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side};
+use nullsweep_planner::workcell::Workcell;
+use nullsweep_planner::workcell::stance::Stance;
+use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Tool};
+use nullsweep_surface::patches::PatchConfig;
+use nullsweep_surface::scan::{CleanConfig, Placement, Scan, clean_region, place};
+use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::simulate;
 
 /// A real plan for the chair's seat and all that it was made for, in the root frame.
 pub(crate) struct Stage {

@@ -17,7 +17,7 @@ const SEAT: &str = "plan --demo chair-seat --profile acceleration --ik-samples 1
 
 /// The joint nearest to its velocity in a knot, as a share of it.
 fn haste(arm: &Arm, plan: &Plan, knot: usize) -> f64 {
-    let shares = arm.limits().iter().zip(plan.knots[knot].v).map(|(l, v)| v.abs() / l.velocity);
+    let shares = arm.limits().iter().zip(&plan.knots[knot].v).map(|(l, v)| v.abs() / l.velocity);
     shares.fold(0.0, f64::max)
 }
 
