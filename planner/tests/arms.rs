@@ -2,16 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use nullsweep_collision::{Obstacle, Options};
+use nullsweep_collision::Options;
 use nullsweep_planner::pipeline::{Job, Outcome, StanceChoice, run};
-use nullsweep_planner::plan::{CostKind, Method, Profile};
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::roadmap::GraphConfig;
-use nullsweep_planner::tour::formulation::FormulationConfig;
+use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_robot::{ArmSpec, Robot, Tool};
-use nullsweep_surface::patches::PatchConfig;
-use nullsweep_surface::scan::{CleanConfig, Placement, Region, clean_region, place};
+use nullsweep_surface::scan::{CleanConfig, Placement, clean_region, place};
 use nullsweep_surface::simulate;
 
 /// An arm in the manner of industrial ones: shoulder and elbow parallel, a spherical wrist, the
@@ -74,10 +71,10 @@ fn on_flange() -> Tool {
     toml::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
 }
 
-fn seat() -> Region {
+fn seat() -> Scene {
     let view = simulate::chair(1);
     let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
-    clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default()).unwrap()
+    clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default()).unwrap().into()
 }
 
 /// Plans from a stance, or from the best of a few.
@@ -92,26 +89,14 @@ fn plan(robot: &Robot, spec: &ArmSpec, tool: Tool, base: Option<[f64; 3]>) -> Ou
         }
     };
     let job = Job {
-        arm: spec.clone(),
         tool,
         stance,
-        surroundings: seat.surroundings.clone(),
-        obstacles: vec![Obstacle::floor(nalgebra::Isometry3::identity())],
-        start: None,
-        after: None,
-        method: Method::Curvature,
-        cost: CostKind::Time,
         ik_samples: 24,
-        v_max: None,
-        profile: Profile::Velocity,
-        patches: PatchConfig::default(),
-        graph: GraphConfig::default(),
-        formulation: FormulationConfig::default(),
         refinements: 0,
         collision: Options { fit_capsules: Some(0.05), ..Options::default() },
-        seed: 1,
+        ..Job::new(spec.clone())
     };
-    run(robot, &seat.surface, &job, &Silent).expect("the seat can be planned")
+    run(robot, &seat, &job, &Silent).expect("the seat can be planned")
 }
 
 /// No rule is broken, and most of what is reached is swept.

@@ -34,7 +34,7 @@ pub use ik::{Branch, InverseKinematics, RedundantJoint, Solution, Solutions};
 pub use joints::{Continuous, JointVector, MAX_DOF, wrap};
 pub use limits::{JointLimits, LimitsError};
 pub use pr2::Side;
-pub use tool::Tool;
+pub use tool::{Mounted, Tool};
 pub use urdf::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, Robot, SafetyController,
     UrdfError,

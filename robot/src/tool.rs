@@ -1,7 +1,10 @@
 //! The tool that touches the surface: a rectangular pad at the end of the arm.
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+
+use crate::arm::Arm;
+use crate::joints::JointVector;
 
 /// A rectangular pad (sponge, brush, squeegee) and how it sits on the arm's tip frame.
 ///
@@ -68,5 +71,34 @@ impl Tool {
             Translation3::from(Vector3::from(self.centre)),
             UnitQuaternion::from_rotation_matrix(&rotation),
         )
+    }
+
+    /// The tool at the tip of an arm.
+    #[must_use]
+    pub fn on<'a>(&self, arm: &'a Arm) -> Mounted<'a> {
+        Mounted { arm, contact_in_tip: self.contact_in_tip() }
+    }
+}
+
+/// A tool at the tip of an arm: where its contact frame is.
+#[derive(Clone, Copy)]
+pub struct Mounted<'a> {
+    arm: &'a Arm,
+    contact_in_tip: Isometry3<f64>,
+}
+
+impl Mounted<'_> {
+    /// Pose of the contact frame in the root frame.
+    #[must_use]
+    #[inline]
+    pub fn pose(&self, q: &JointVector) -> Isometry3<f64> {
+        self.arm.tip_pose(q) * self.contact_in_tip
+    }
+
+    /// The pad's centre in the root frame. \[m\]
+    #[must_use]
+    #[inline]
+    pub fn centre(&self, q: &JointVector) -> Point3<f64> {
+        Point3::from(self.pose(q).translation.vector)
     }
 }

@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use nullsweep_collision as collision;
-use nullsweep_experiment::{self as experiment, METHODS, Object, Plan, Setting};
+use nullsweep_experiment::{self as experiment, Object, Plan, Setting};
 use nullsweep_planner::pipeline::{Job, StanceChoice};
-use nullsweep_planner::plan::{CostKind, Method, Profile};
+use nullsweep_planner::plan::Method;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
@@ -18,7 +17,7 @@ use nullsweep_surface::patches::PatchConfig;
 
 use crate::bars::Bars;
 use crate::choices::ObjectArg;
-use crate::scene::{Demo, Scene, SceneArgs, scene};
+use crate::scene::{Demo, SceneArgs, scene};
 use crate::{OK, write_json};
 
 #[derive(Debug, Args)]
@@ -67,8 +66,8 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
         Object::BobbyCar => Demo::BobbyCar,
     };
     let demo = args.scans.is_empty().then_some(demo);
-    let Scene { surface, surroundings, obstacles } =
-        scene(&args.scene, demo, &args.scans, args.seed, &bars)?;
+    let scene = scene(&args.scene, demo, &args.scans, args.seed, &bars)?;
+    let surface = &scene.surface;
     let tool = Tool { symmetric: args.symmetric, ..Tool::default() };
     let spec = ArmSpec::pr2(Side::Right);
     let (patches, graph) = (PatchConfig::default(), GraphConfig::default());
@@ -97,27 +96,16 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
     }
     if args.tracked_repeats > 0 {
         let job = Job {
-            arm: spec,
             tool,
             stance: StanceChoice::Search(StanceSearch::default()),
-            surroundings,
-            obstacles,
-            start: None,
-            after: None,
-            method: METHODS[0],
-            cost: CostKind::Time,
-            ik_samples: 100,
-            v_max: None,
-            profile: Profile::Velocity,
             patches,
             graph,
             formulation: plan.formulation,
-            refinements: 2,
-            collision: collision::Options::default(),
             seed: args.seed,
+            ..Job::new(spec)
         };
         let repeats = args.tracked_repeats as usize;
-        report.tracked = experiment::tracked(&robot, &surface, &job, repeats, &bars)?;
+        report.tracked = experiment::tracked(&robot, &scene, &job, repeats, &bars)?;
     }
     report.peak_memory_bytes = peak_memory();
     bars.clear();

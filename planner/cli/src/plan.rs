@@ -21,7 +21,7 @@ use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg};
 use crate::picture::picture;
 use crate::robot::RobotArgs;
-use crate::scene::{Demo, Numbers, Scene, SceneArgs, scene};
+use crate::scene::{Demo, Numbers, SceneArgs, scene};
 use crate::{OK, VIOLATIONS, write_json};
 
 #[derive(Debug, Args)]
@@ -170,8 +170,8 @@ pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8,
     let robot = args.robot.robot()?;
     bars.stage("scan", None);
     let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
-    let job = job(args, &robot, &scene, after)?;
-    let outcome = pipeline::run(&robot, &scene.surface, &job, &bars);
+    let job = job(args, &robot, after)?;
+    let outcome = pipeline::run(&robot, &scene, &job, &bars);
     bars.clear();
     let outcome = outcome?;
     Ok((finish(args, &outcome)?, outcome.plan))
@@ -264,7 +264,7 @@ fn figures_table(figures: &Figures) -> report::Table {
     }
 }
 
-fn job(args: &PlanArgs, robot: &Robot, scene: &Scene, after: Option<After>) -> anyhow::Result<Job> {
+fn job(args: &PlanArgs, robot: &Robot, after: Option<After>) -> anyhow::Result<Job> {
     let tool = match &args.tool {
         None => Tool::default(),
         Some(path) => {
@@ -297,8 +297,6 @@ fn job(args: &PlanArgs, robot: &Robot, scene: &Scene, after: Option<After>) -> a
         arm: args.robot.spec()?,
         tool,
         stance,
-        surroundings: scene.surroundings.clone(),
-        obstacles: scene.obstacles.clone(),
         start: (!args.start.is_empty()).then_some(start),
         after,
         method: args.method.into(),

@@ -8,6 +8,7 @@ use clap::Args;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape};
 use nullsweep_planner::progress::Progress;
+use nullsweep_planner::workcell::Scene;
 use nullsweep_surface::scan::{
     self, CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan,
 };
@@ -71,13 +72,6 @@ impl<const N: usize> FromStr for Numbers<N> {
     }
 }
 
-/// The scan to sweep, and all else that is there, in the floor frame.
-pub(super) struct Scene {
-    pub(super) surface: Scan,
-    pub(super) surroundings: Vec<Point3<f64>>,
-    pub(super) obstacles: Vec<Obstacle>,
-}
-
 /// Reads and joins the scans, or simulates `demo`'s with the noise of `seed`, and cleans them.
 pub(super) fn scene(
     args: &SceneArgs,
@@ -92,18 +86,14 @@ pub(super) fn scene(
     };
     let region = args.crop.or(region);
     let config = CleanConfig::default();
-    let (surface, surroundings) = match region {
-        None => (scan::clean(&placed, &config)?.0, Vec::new()),
-        Some(region) => {
-            let cut = scan::clean_region(&placed, &region, &config)?;
-            (cut.surface, cut.surroundings)
-        }
+    let mut scene = match region {
+        None => Scene::on_floor(scan::clean(&placed, &config)?.0),
+        Some(region) => Scene::from(scan::clean_region(&placed, &region, &config)?),
     };
-    let mut obstacles = vec![Obstacle::floor(Isometry3::identity())];
     if args.support_height > 0.0 {
-        obstacles.push(table_under(&surface, args.support_height));
+        scene.obstacles.push(table_under(&scene.surface, args.support_height));
     }
-    Ok(Scene { surface, surroundings, obstacles })
+    Ok(scene)
 }
 
 fn simulated(demo: Demo, seed: u64) -> (PlacedScan, Option<CropBox>) {

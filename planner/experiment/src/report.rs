@@ -7,8 +7,8 @@ use nullsweep_planner::plan::{CostKind, Method};
 use nullsweep_planner::progress::{Progress, Silent};
 use nullsweep_planner::tour::formulation::{FormulationConfig, FormulationError};
 use nullsweep_planner::tour::joint::JointConfig;
+use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::Robot;
-use nullsweep_surface::scan::Scan;
 use serde::{Deserialize, Serialize};
 
 use crate::methods::{Figures, Run, Task, V_MAX, plan};
@@ -299,7 +299,7 @@ fn off_surface(setting: &Setting, pad: &Point3<f64>) -> f64 {
 /// Those of the pipeline.
 pub fn tracked(
     robot: &Robot,
-    scan: &Scan,
+    scene: &Scene,
     job: &Job,
     repeats: usize,
     progress: &dyn Progress,
@@ -313,14 +313,11 @@ pub fn tracked(
             for repeat in 0..repeats {
                 let job_of =
                     Job { method, cost: optimised, seed: job.seed + repeat as u64, ..job.clone() };
-                let outcome = pipeline::run(robot, scan, &job_of, &Silent)?;
+                let outcome = pipeline::run(robot, scene, &job_of, &Silent)?;
                 progress.tick();
                 let f = &outcome.figures;
                 let held = f.held.iter().map(|(name, &value)| (name.clone(), value)).collect();
-                job.stance = StanceChoice::Given(nullsweep_planner::workcell::stance::Stance {
-                    base: f.base,
-                    held,
-                });
+                job.stance = StanceChoice::Given(Stance { base: f.base, held });
                 let spent = |stage: &str| f.calc_time_s.get(stage).copied().unwrap_or(0.0);
                 rows.push(Tracked {
                     optimised,

@@ -6,23 +6,22 @@ use nullsweep_surface::scan::Scan;
 use nullsweep_surface::sheet::Surface;
 use rayon::prelude::*;
 
-use super::{Clock, Job, PipelineError};
+use super::clock::Clock;
+use super::error::PipelineError;
+use super::job::Job;
 use crate::cost::{Cost, Effort, TaskTime};
 use crate::motion::layered;
 use crate::motion::mover::{Leg, Mover};
-use crate::plan::{
-    Continues, CostKind, FORMAT, Held, Method, Plan, PlanKnot, Profile, SurfaceSample,
-};
+use crate::plan::{Continues, CostKind, Method, Plan};
 use crate::progress::Progress;
 use crate::roadmap::{Graph, graph};
 use crate::sweep::{contact_motion, coverage};
-use crate::timing;
 use crate::tour::formulation::{self, Stop};
 use crate::workcell::stance::Stance;
 use crate::workcell::{Sample, Workcell, reach, redundancies};
 
 /// What every attempt at a plan shares, in the root frame.
-pub(super) struct Shop<'a> {
+pub(super) struct Planning<'a> {
     pub(super) robot: &'a Robot,
     pub(super) job: &'a Job,
     pub(super) stance: &'a Stance,
@@ -32,6 +31,8 @@ pub(super) struct Shop<'a> {
     pub(super) start: JointVector,
     /// Of each joint. \[rad/s\] or \[m/s\]
     pub(super) velocity: JointVector,
+    /// Where the plan takes over from another one.
+    pub(super) continues: Option<Continues>,
     /// The points of reachable patches.
     pub(super) to_sweep: &'a [bool],
     /// The points that were swept before the plan begins.
@@ -77,7 +78,7 @@ impl Sequence {
     }
 }
 
-impl Shop<'_> {
+impl Planning<'_> {
     /// A plan that visits the patches for which `visit` has a sample; the first patches are those
     /// of `before`.
     pub(super) fn attempt(
@@ -110,7 +111,8 @@ impl Shop<'_> {
             order(&graph, &patches, &job.tool, &tool_pose, &job.formulation, job.seed)
         })?;
         progress.stage("layered graph and transfers", None);
-        let context = Context { shop: self, graph: &graph, patches: &patches, visit: &visit };
+        let context =
+            TourContext { planning: self, graph: &graph, patches: &patches, visit: &visit };
         let sequence = clock.time("layered", || match job.cost {
             CostKind::Effort => context.sequence(&Effort, &tour),
             CostKind::Time => context.sequence(&TaskTime::new(&self.velocity), &tour),
@@ -122,7 +124,7 @@ impl Shop<'_> {
 
     /// The points to sweep that the plan leaves out.
     pub(super) fn left(&self, plan: &Plan) -> Vec<bool> {
-        let poses = contact_motion(plan, self.cell.arm);
+        let poses = contact_motion(plan.trajectory(), self.cell.arm);
         let swept = coverage::swept(self.scan, &poses, &self.job.tool);
         (0..swept.len()).map(|i| self.to_sweep[i] && !swept[i] && !self.already[i]).collect()
     }
@@ -167,18 +169,18 @@ impl Shop<'_> {
 }
 
 /// What the layered search needs.
-struct Context<'a> {
-    shop: &'a Shop<'a>,
+struct TourContext<'a> {
+    planning: &'a Planning<'a>,
     graph: &'a Graph,
     patches: &'a [Patch],
     visit: &'a [Option<Sample>],
 }
 
-impl Context<'_> {
+impl TourContext<'_> {
     /// The cheapest joint path through the tour's poses. A stop into which no motion is found is
     /// left out.
     fn sequence<C: Cost>(&self, cost: &C, tour: &[Stop]) -> Result<Sequence, PipelineError> {
-        let Shop { cell, job, start, progress, .. } = *self.shop;
+        let Planning { cell, job, start, progress, .. } = *self.planning;
         let continuous = cell.arm.continuous();
         let values = redundancies(cell.arm.ik().redundancy_range(), job.ik_samples);
         let layers: Vec<Vec<Sample>> =
@@ -221,7 +223,7 @@ impl Context<'_> {
 
     /// All samples at a stop; for a symmetric pad also those of the opposite heading.
     fn layer_at(&self, stop: &Stop, values: &[f64]) -> Vec<Sample> {
-        let cell = self.shop.cell;
+        let cell = self.planning.cell;
         let mut layer = Vec::new();
         let turns: &[f64] = if cell.tool.symmetric { &[0.0, std::f64::consts::PI] } else { &[0.0] };
         for turn in turns {
@@ -230,72 +232,5 @@ impl Context<'_> {
             cell.samples(&contact, stop.heading, values, &mut layer);
         }
         layer
-    }
-}
-
-impl Shop<'_> {
-    /// Joins the legs, unwraps continuous joints and sets the times.
-    pub(super) fn assemble(&self, patches: &[Patch], sequence: &Sequence) -> Plan {
-        let Self { robot, job, stance, scan, .. } = *self;
-        let arm = self.cell.arm;
-        let mut knots: Vec<PlanKnot> = Vec::new();
-        for Visit { patch, leg, .. } in &sequence.visits {
-            let shift =
-                knots.last().map_or(JointVector::ZERO, |last| leg.joints[0].turns_to(&last.q));
-            let first = usize::from(!knots.is_empty());
-            for (q, line) in leg.joints.iter().zip(&leg.line).skip(first) {
-                let q = *q + shift;
-                let line = line.map(|p| [p.x, p.y, p.z]);
-                knots.push(PlanKnot { time_ns: 0, q, v: JointVector::ZERO, line, patch: None });
-            }
-            if let Some(last) = knots.last_mut() {
-                last.patch = Some(*patch as u32);
-            }
-        }
-        // A knot that repeats its predecessor would take no time.
-        knots.dedup_by(|b, a| {
-            let same = a.q == b.q;
-            if same {
-                a.patch = a.patch.or(b.patch);
-                a.line = a.line.or(b.line);
-            }
-            same
-        });
-        let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
-        for (knot, time) in knots.iter_mut().zip(timing::bang_bang(&joints, &self.velocity)) {
-            knot.time_ns = time;
-        }
-        Plan {
-            format: FORMAT,
-            robot: robot.name().into(),
-            fingerprint: arm.fingerprint(),
-            joints: arm.joint_names().to_vec(),
-            held: Held::all_of(arm),
-            tool: job.tool.clone(),
-            base: stance.base,
-            method: job.method,
-            cost: job.cost,
-            profile: Profile::Velocity,
-            seed: job.seed,
-            knots,
-            patches: patches.iter().map(|p| p.centre.into()).collect(),
-            surface: (0..scan.points.len())
-                .map(|i| SurfaceSample {
-                    point: scan.points[i].into(),
-                    normal: scan.normals[i].into_inner().into(),
-                    reachable: self.to_sweep[i],
-                })
-                .collect(),
-            continues: job
-                .after
-                .as_ref()
-                .filter(|a| a.held.is_none())
-                .map(|a| Continues { digest: a.plan.digest(), knot: a.knot as u32 }),
-            past: job
-                .after
-                .as_ref()
-                .filter(|a| !a.again)
-                .map_or_else(Vec::new, |a| a.plan.followed(a.knot)),
-        }
     }
 }

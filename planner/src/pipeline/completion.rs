@@ -11,8 +11,9 @@ use nullsweep_robot::JointVector;
 use nullsweep_surface::patches::{self, Patch};
 use rayon::prelude::*;
 
-use super::attempt::{Attempt, Shop, Visit};
-use super::{Clock, SWEPT_SHARE};
+use super::attempt::{Attempt, Planning, Visit};
+use super::clock::Clock;
+use super::swept::SWEPT_SHARE;
 use crate::cost::{Cost, Effort, TaskTime};
 use crate::motion::layered::{Motion, Moves};
 use crate::motion::mover::{Leg, Mover};
@@ -36,14 +37,14 @@ const HEADINGS: usize = 4;
 const JUMPS: usize = 24;
 const BATCH: usize = 4;
 
-impl Shop<'_> {
+impl Planning<'_> {
     /// Adds visits to what the attempt has left out, as far as motions there are found.
     pub(super) fn complete(&self, attempt: &mut Attempt, clock: &mut Clock) {
         self.progress.stage("side trips", None);
         clock.time("side trips", || match self.job.cost {
-            CostKind::Effort => Completion { shop: self, cost: &Effort }.run(attempt),
+            CostKind::Effort => Completion { planning: self, cost: &Effort }.run(attempt),
             CostKind::Time => {
-                Completion { shop: self, cost: &TaskTime::new(&self.velocity) }.run(attempt);
+                Completion { planning: self, cost: &TaskTime::new(&self.velocity) }.run(attempt);
             }
         });
         let Attempt { patches, sequence, left, .. } = attempt;
@@ -56,18 +57,18 @@ impl Shop<'_> {
 }
 
 struct Completion<'a, C> {
-    shop: &'a Shop<'a>,
+    planning: &'a Planning<'a>,
     cost: &'a C,
 }
 
 impl<C: Cost> Completion<'_, C> {
     fn run(&self, attempt: &mut Attempt) {
-        let full = patches::full_neighbourhood(self.shop.scan, self.shop.fill_in_radius());
+        let full = patches::full_neighbourhood(self.planning.scan, self.planning.fill_in_radius());
         let worth = ((WORTH * full as f64) as usize).max(1);
         for _ in 0..ROUNDS {
             let mut gained = false;
             let mut left = attempt.left.clone();
-            for patch in self.shop.fill_in(&attempt.left, worth) {
+            for patch in self.planning.fill_in(&attempt.left, worth) {
                 // A side trip sweeps more than the patch that it was made for.
                 let open = patch.points.iter().filter(|&&i| left[i as usize]).count();
                 if open < worth {
@@ -84,14 +85,14 @@ impl<C: Cost> Completion<'_, C> {
             if !gained {
                 return;
             }
-            attempt.plan = self.shop.assemble(&attempt.patches, &attempt.sequence);
-            attempt.left = self.shop.left(&attempt.plan);
+            attempt.plan = self.planning.assemble(&attempt.patches, &attempt.sequence);
+            attempt.left = self.planning.left(&attempt.plan);
         }
     }
 
     /// Takes out what the leg sweeps.
     fn sweep(&self, leg: &Leg, left: &mut [bool]) {
-        let Shop { cell, scan, job, .. } = self.shop;
+        let Planning { cell, scan, job, .. } = self.planning;
         let contact = job.tool.contact_in_tip();
         let poses: Vec<_> = leg.joints.iter().map(|q| cell.arm.tip_pose(q) * contact).collect();
         for (left, swept) in left.iter_mut().zip(coverage::swept(scan, &poses, &job.tool)) {
@@ -102,11 +103,11 @@ impl<C: Cost> Completion<'_, C> {
     /// Puts visits of the last patch into the sequence; their first index, `None` where no motion
     /// there is found.
     fn visit(&self, attempt: &mut Attempt) -> Option<usize> {
-        let Shop { cell, job, start, .. } = *self.shop;
+        let Planning { cell, job, start, .. } = *self.planning;
         let patch = attempt.patches.len() - 1;
         let mover = Mover::new(cell, &attempt.graph, &[], self.cost, start, job.seed);
         let trip = Trip {
-            shop: self.shop,
+            planning: self.planning,
             cost: self.cost,
             mover,
             patches: &attempt.patches,
@@ -144,7 +145,7 @@ enum After {
 
 /// The search for motions to one patch.
 struct Trip<'a, C> {
-    shop: &'a Shop<'a>,
+    planning: &'a Planning<'a>,
     cost: &'a C,
     mover: Mover<'a, C>,
     patches: &'a [Patch],
@@ -165,7 +166,7 @@ impl<C: Cost> Trip<'_, C> {
             .iter()
             .enumerate()
             .map(|(i, v)| ((self.patches[v.patch].centre - centre).norm(), i))
-            .filter(|&(distance, _)| distance > 1e-6 && distance <= self.shop.job.graph.radius)
+            .filter(|&(distance, _)| distance > 1e-6 && distance <= self.planning.job.graph.radius)
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near.truncate(STOPS);
@@ -180,7 +181,7 @@ impl<C: Cost> Trip<'_, C> {
 
     /// A way along the surface from one stop, the pad turned from the line as it is there.
     fn reach_from(&self, stop: usize) -> Option<(Sample, Motion<Leg>)> {
-        let Shop { job, surface, .. } = self.shop;
+        let Planning { job, surface, .. } = self.planning;
         let Visit { patch, sample: from, .. } = &self.visits[stop];
         let edge = Edge::between(surface, self.patches, *patch, self.patch, &job.graph)?;
         let heading = edge.heading_b + from.heading - edge.heading_a;
@@ -196,16 +197,16 @@ impl<C: Cost> Trip<'_, C> {
 
     /// A jump to the patch and one from there on, in place of a jump or at the end.
     fn through_free_space(&self) -> Option<(usize, Visit, After)> {
-        let continuous = self.shop.cell.arm.continuous();
+        let continuous = self.planning.cell.arm.continuous();
         let straight =
             |from: &JointVector, to: &JointVector| self.cost.of(&continuous.displacement(from, to));
         let before = |at: usize| at.checked_sub(1).map(|b| &self.visits[b].sample);
-        let q_before = |at: usize| before(at).map_or(&self.shop.start, |s| &s.q);
+        let q_before = |at: usize| before(at).map_or(&self.planning.start, |s| &s.q);
         let places: Vec<usize> = (0..self.visits.len())
             .filter(|&at| self.visits[at].leg.is_jump())
             .chain([self.visits.len()])
             .collect();
-        let turn = if self.shop.job.tool.symmetric { 0.5 } else { 1.0 } * std::f64::consts::TAU;
+        let turn = if self.planning.job.tool.symmetric { 0.5 } else { 1.0 } * std::f64::consts::TAU;
         let mut choices: Vec<(f64, usize, Sample)> = (0..HEADINGS)
             .flat_map(|h| self.samples(turn * h as f64 / HEADINGS as f64))
             .flat_map(|sample| places.iter().map(move |&at| (at, sample)))
@@ -243,7 +244,7 @@ impl<C: Cost> Trip<'_, C> {
 
     /// All samples at the patch at one heading.
     fn samples(&self, heading: f64) -> Vec<Sample> {
-        let Shop { cell, job, .. } = self.shop;
+        let Planning { cell, job, .. } = self.planning;
         let contact = pose(self.patches, &job.tool, &Stop { patch: self.patch, heading });
         let mut samples = Vec::new();
         cell.samples(&contact, heading, &self.values, &mut samples);

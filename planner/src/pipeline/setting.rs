@@ -1,19 +1,20 @@
 //! The robot in its place.
 
 use nalgebra::Point3;
-use nullsweep_collision::{Obstacle, World};
+use nullsweep_collision::World;
 use nullsweep_robot::{Arm, Robot};
 use nullsweep_surface::patches::Patch;
 use nullsweep_surface::scan::Scan;
 use nullsweep_surface::sheet::Surface;
 use rayon::prelude::*;
 
+use super::error::PipelineError;
+use super::job::{Job, StanceChoice};
 use super::start::start;
-use super::{Job, PipelineError, StanceChoice};
 use crate::progress::Silent;
 use crate::roadmap::{GraphConfig, graph};
-use crate::workcell::stance::{self, Stance};
-use crate::workcell::{Sample, Workcell, reach};
+use crate::workcell::stance::{self, Stance, StanceSearch};
+use crate::workcell::{Sample, Scene, Workcell, reach};
 
 /// The robot in its place: everything in its root frame.
 pub(super) struct Setting {
@@ -28,33 +29,46 @@ pub(super) struct Setting {
 pub(super) fn settle(
     robot: &Robot,
     arm: &Arm,
-    scan: &Scan,
+    scene: &Scene,
     patches: &[Patch],
     job: &Job,
 ) -> Result<Setting, PipelineError> {
     match &job.stance {
         StanceChoice::Given(stance) => {
-            let setting = Setting::new(robot, arm, scan, patches, job, stance.clone())?;
+            let setting = Setting::new(robot, arm, scene, patches, job, stance.clone())?;
             match setting.world.stance_hit() {
                 Some(hit) => Err(PipelineError::StanceHit { hit: hit.to_string() }),
                 None => Ok(setting),
             }
         }
-        StanceChoice::Search(search) => {
-            let candidates = stance::candidates(robot, arm, &job.tool, scan, patches, search)?;
-            let tried = candidates.len();
-            // Candidates are looked at side by side, each by itself.
-            let open: Vec<Result<Option<Open>, PipelineError>> = candidates
-                .into_par_iter()
-                .map(|c| {
-                    let setting = Setting::new(robot, arm, scan, patches, job, c.stance)?;
-                    Ok(setting.open(job))
-                })
-                .collect();
-            let open: Result<Vec<_>, _> = open.into_iter().filter_map(Result::transpose).collect();
-            best_of(open?, job).ok_or(PipelineError::NoStance { tried, patches: patches.len() })
+        StanceChoice::Auto => {
+            search(robot, arm, scene, patches, job, &StanceSearch::of(robot, arm, &job.tool))
         }
+        StanceChoice::Search(options) => search(robot, arm, scene, patches, job, options),
     }
+}
+
+/// The best of the stances that are searched.
+fn search(
+    robot: &Robot,
+    arm: &Arm,
+    scene: &Scene,
+    patches: &[Patch],
+    job: &Job,
+    options: &StanceSearch,
+) -> Result<Setting, PipelineError> {
+    let candidates = stance::candidates(robot, arm, &job.tool, &scene.surface, patches, options)?;
+    let tried = candidates.len();
+    // Candidates are looked at side by side, each by itself.
+    let open: Vec<Result<Option<Open>, PipelineError>> = candidates
+        .into_par_iter()
+        .map(|c| {
+            let setting = Setting::new(robot, arm, scene, patches, job, c.stance)?;
+            Ok(setting.open(job))
+        })
+        .collect();
+    let open: Result<Vec<_>, _> = open.into_iter().filter_map(Result::transpose).collect();
+    best_of(open?, job).ok_or(PipelineError::NoStance { tried, patches: patches.len() })
 }
 
 /// A stance that reaches something, not yet looked at as a whole.
@@ -88,21 +102,15 @@ impl Setting {
     fn new(
         robot: &Robot,
         arm: &Arm,
-        scan: &Scan,
+        scene: &Scene,
         patches: &[Patch],
         job: &Job,
         stance: Stance,
     ) -> Result<Self, PipelineError> {
         let arm = stance.bind(arm)?;
         let to_root = stance.pose().inverse();
-        let scan = scan.transformed(&to_root);
         let patches: Vec<Patch> = patches.iter().map(|p| p.transformed(&to_root)).collect();
-        let obstacles: Vec<Obstacle> = job
-            .obstacles
-            .iter()
-            .map(|o| Obstacle { pose: to_root * o.pose, ..o.clone() })
-            .collect();
-        let surroundings = job.surroundings.iter().map(|p| to_root * p);
+        let Scene { surface: scan, surroundings, obstacles } = scene.transformed(&to_root);
         let points: Vec<Point3<f64>> = scan.points.iter().copied().chain(surroundings).collect();
         let world = World::new(robot, &arm, &job.tool, &points, &obstacles, &job.collision)?;
         Ok(Self { stance, arm, scan, patches, world })

@@ -3,7 +3,18 @@
 use nullsweep_collision::{self as collision, CollisionError, ToolContact, World};
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
 
-use super::{Job, PipelineError};
+use super::error::PipelineError;
+use super::job::{After, Job};
+use crate::plan::Profile;
+use crate::timing::{Limits, Rest};
+
+/// The way to rest on the path of the plan that a job joins in motion; `None` where it does not.
+pub(super) fn rest_before(job: &Job, arm: &Arm) -> Option<Rest> {
+    let After { plan, knot, held, .. } = job.after.as_ref()?;
+    let smooth = Profile::Acceleration;
+    let joins = job.profile == smooth && plan.profile == smooth && held.is_none();
+    if joins { Rest::after(plan, *knot, &Limits::of(arm, None)) } else { None }
+}
 
 /// Where the arm is before the first motion.
 pub(super) struct Start {

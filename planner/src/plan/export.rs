@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use crate::plan::{Plan, Profile};
+use super::file::Plan;
+use super::settings::Profile;
 
 /// How a trajectory is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +20,7 @@ pub enum Format {
 
 /// trajectory_msgs/JointTrajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Trajectory {
+pub struct JointTrajectory {
     /// std_msgs/Header with a stamp of 0: start at once.
     pub header: Header,
     /// Base to tip.
@@ -65,7 +66,7 @@ pub struct Point {
 
 /// The plan's motion.
 #[must_use]
-pub fn trajectory(plan: &Plan) -> Trajectory {
+pub fn trajectory(plan: &Plan) -> JointTrajectory {
     let dof = plan.joints.len();
     let curved = plan.profile == Profile::Acceleration;
     let points = plan
@@ -82,7 +83,7 @@ pub fn trajectory(plan: &Plan) -> Trajectory {
             },
         })
         .collect();
-    Trajectory { header: Header::default(), joint_names: plan.joints.clone(), points }
+    JointTrajectory { header: Header::default(), joint_names: plan.joints.clone(), points }
 }
 
 /// Writes the plan's motion.
@@ -100,7 +101,7 @@ pub fn write(plan: &Plan, format: Format, out: &mut impl Write) -> io::Result<()
     }
 }
 
-fn yaml(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
+fn yaml(trajectory: &JointTrajectory, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "header: {{seq: 0, stamp: {{secs: 0, nsecs: 0}}, frame_id: ''}}")?;
     writeln!(out, "joint_names: [{}]", trajectory.joint_names.join(", "))?;
     writeln!(out, "points:")?;

@@ -1,19 +1,16 @@
 //! The plan: what the planner makes, stores and publishes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use nullsweep_ipc_types::{
-    Contact, Interpolation, Knot, MAX_HELD_JOINTS, MAX_JOINTS, MAX_KNOTS, PlanHeader, PlanMessage,
-    checksum,
-};
-use nullsweep_robot::{Arm, JointVector, MAX_DOF, Tool};
+use nullsweep_robot::{Arm, Tool};
 use serde::{Deserialize, Serialize};
 
-use crate::plan::{CostKind, Curve, Method, Profile};
-
-/// The version of the plan file that this build reads and writes.
-pub const FORMAT: u32 = 1;
+use super::curve::Curve;
+use super::error::{FORMAT, PlanError};
+use super::knot::PlanKnot;
+use super::settings::{CostKind, Method, Profile};
+use super::trajectory::Trajectory;
 
 /// A timed joint path that sweeps a surface, with everything needed to check and to publish it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,6 +75,14 @@ pub struct Held {
     pub position: f64,
 }
 
+impl Stretch {
+    /// The timed path through its knots.
+    #[must_use]
+    pub fn trajectory(&self) -> Trajectory<'_> {
+        Trajectory { tool: &self.tool, profile: self.profile, knots: &self.knots }
+    }
+}
+
 impl Held {
     /// Every held joint of an arm, in the order of its URDF.
     #[must_use]
@@ -101,25 +106,6 @@ pub struct SurfaceSample {
     pub reachable: bool,
 }
 
-/// One knot.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PlanKnot {
-    /// Time since the plan's start. \[ns\]
-    #[serde(rename = "t")]
-    pub time_ns: u64,
-    /// Joint vector, continuous joints unwrapped along the plan. \[rad\] or \[m\]
-    pub q: JointVector,
-    /// Joint velocities, of a plan with limited acceleration; else zero. \[rad/s\] or \[m/s\]
-    #[serde(skip_serializing_if = "is_zero", default)]
-    pub v: JointVector,
-    /// The planned pad centre in the root frame while the pad is on the surface. \[m\]
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub line: Option<[f64; 3]>,
-    /// The patch that is reached in this knot.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub patch: Option<u32>,
-}
-
 /// The knot of another plan in which a plan starts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Continues {
@@ -128,49 +114,6 @@ pub struct Continues {
     pub digest: u64,
     /// The knot.
     pub knot: u32,
-}
-
-/// Why a plan file cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum PlanError {
-    /// The file cannot be read or written.
-    #[error("{path}: {source}")]
-    File {
-        /// Which file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file is not a plan.
-    #[error("{path}: not a plan file: {source} (make one with `planner plan`)")]
-    Parse {
-        /// Which file.
-        path: PathBuf,
-        /// Line, column and cause.
-        source: serde_json::Error,
-    },
-    /// Written by another version.
-    #[error("{path}: plan format {found}, this build reads {FORMAT}: plan it again")]
-    Format {
-        /// Which file.
-        path: PathBuf,
-        /// Its version.
-        found: u32,
-    },
-    /// More knots than the wire takes.
-    #[error(
-        "the plan has {found} knots, the wire takes {MAX_KNOTS}: plan fewer patches at once (--crop)"
-    )]
-    TooLong {
-        /// How many.
-        found: usize,
-    },
-    /// More held joints than the wire takes.
-    #[error("the robot has {found} other moving joints, the wire takes {MAX_HELD_JOINTS}")]
-    TooManyHeld {
-        /// How many.
-        found: usize,
-    },
 }
 
 impl Plan {
@@ -213,22 +156,28 @@ impl Plan {
         self.knots.last().map_or(0.0, |k| k.time_ns as f64 * 1e-9)
     }
 
-    /// The planned pad centre of each knot on the surface, root frame. \[m\]
+    /// The timed path through its knots.
     #[must_use]
-    pub fn line(&self, knot: usize) -> Option<Point3<f64>> {
-        self.knots.get(knot)?.line.map(Point3::from)
+    pub fn trajectory(&self) -> Trajectory<'_> {
+        Trajectory { tool: &self.tool, profile: self.profile, knots: &self.knots }
     }
 
-    /// The motion that ends in a knot, as the executor interpolates it; a stand-still at the first
-    /// one.
+    /// See [`Trajectory::line`].
+    #[must_use]
+    pub fn line(&self, knot: usize) -> Option<Point3<f64>> {
+        self.trajectory().line(knot)
+    }
+
+    /// See [`Trajectory::curve`].
     #[must_use]
     pub fn curve(&self, knot: usize) -> Curve {
-        let (a, b) = (&self.knots[knot.saturating_sub(1)], &self.knots[knot]);
-        let seconds = b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9;
-        match self.profile {
-            Profile::Velocity => Curve::line(&a.q, &b.q, seconds),
-            Profile::Acceleration => Curve::cubic((&a.q, &a.v), (&b.q, &b.v), seconds),
-        }
+        self.trajectory().curve(knot)
+    }
+
+    /// See [`Trajectory::on_surface`].
+    #[must_use]
+    pub fn on_surface(&self, knot: usize) -> bool {
+        self.trajectory().on_surface(knot)
     }
 
     /// All that has been followed when this plan has come to a knot: its past, and itself so far.
@@ -238,76 +187,6 @@ impl Plan {
         let last = Stretch { tool: self.tool.clone(), profile: self.profile, knots };
         self.past.iter().cloned().chain([last]).collect()
     }
-
-    /// Whether the pad is on the surface in the segment that ends in a knot.
-    #[must_use]
-    pub fn on_surface(&self, knot: usize) -> bool {
-        let before = self.line(knot.saturating_sub(1));
-        before.is_some() && self.line(knot).is_some()
-    }
-
-    /// A checksum of what the executor is asked to do: the same for the same motion.
-    #[must_use]
-    pub fn digest(&self) -> u64 {
-        self.message_parts().map_or(0, |(header, _)| header.checksum)
-    }
-
-    /// The plan as it goes over the wire, without id and join rule, its checksum set.
-    ///
-    /// # Errors
-    /// [`PlanError::TooLong`] and [`PlanError::TooManyHeld`].
-    pub fn message_parts(&self) -> Result<(PlanHeader, Vec<Knot>), PlanError> {
-        if self.knots.len() > MAX_KNOTS {
-            return Err(PlanError::TooLong { found: self.knots.len() });
-        }
-        if self.held.len() > MAX_HELD_JOINTS {
-            return Err(PlanError::TooManyHeld { found: self.held.len() });
-        }
-        let knots: Vec<Knot> =
-            (0..self.knots.len()).map(|k| self.knots[k].wire(self.on_surface(k))).collect();
-        let pose = self.base_pose();
-        let (t, r) = (pose.translation.vector, pose.rotation.coords);
-        let tool = serde_json::to_vec(&self.tool).unwrap_or_default();
-        let mut header = PlanHeader {
-            fingerprint: self.fingerprint,
-            tool: xxhash_rust::xxh3::xxh3_64(&tool),
-            base_pose: [t.x, t.y, t.z, r.x, r.y, r.z, r.w],
-            held_count: self.held.len() as u32,
-            joint_count: self.joints.len() as u32,
-            knot_count: knots.len() as u32,
-            interpolation: match self.profile {
-                Profile::Velocity => Interpolation::Linear.wire(),
-                Profile::Acceleration => Interpolation::Cubic.wire(),
-            },
-            ..PlanHeader::default()
-        };
-        for (slot, held) in header.held_positions.iter_mut().zip(&self.held) {
-            *slot = held.position;
-        }
-        header.checksum = checksum(PlanMessage { header: &header, knots: &knots });
-        Ok((header, knots))
-    }
-}
-
-impl PlanKnot {
-    fn wire(&self, on_surface: bool) -> Knot {
-        let mut positions = [0.0; MAX_JOINTS];
-        positions[..MAX_DOF].copy_from_slice(&self.q[..]);
-        let mut velocities = [0.0; MAX_JOINTS];
-        velocities[..MAX_DOF].copy_from_slice(&self.v[..]);
-        let contact = if on_surface { Contact::Contact } else { Contact::Transfer };
-        Knot {
-            time_from_start_ns: self.time_ns,
-            positions,
-            velocities,
-            patch: self.patch.unwrap_or(Knot::NO_PATCH),
-            contact: contact.wire(),
-        }
-    }
-}
-
-fn is_zero(v: &JointVector) -> bool {
-    *v == JointVector::default()
 }
 
 /// 64-bit numbers as hexadecimal strings.

@@ -1,10 +1,17 @@
 //! The plan: what the planner makes, stores and hands on.
 
-pub mod curve;
+mod curve;
+mod error;
 pub mod export;
 mod file;
+mod knot;
+mod message;
 mod settings;
+mod trajectory;
 
 pub use curve::Curve;
-pub use file::*;
+pub use error::{FORMAT, PlanError};
+pub use file::{Continues, Held, Plan, Stretch, SurfaceSample};
+pub use knot::PlanKnot;
 pub use settings::{CostKind, Method, Profile};
+pub use trajectory::Trajectory;

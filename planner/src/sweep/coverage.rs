@@ -1,9 +1,12 @@
 //! What the pad has swept: coverage measured on the motion itself, not promised by its graph.
 
 use nalgebra::Isometry3;
-use nullsweep_robot::Tool;
+use nullsweep_robot::{Arm, Tool};
 use nullsweep_surface::grid::Grid;
 use nullsweep_surface::scan::Scan;
+
+use super::pads::contact_motion;
+use crate::plan::Trajectory;
 
 /// For each point of the scan whether the pad passes over it: at some pose the point lies in the
 /// pad's rectangle, within `tool.reach_normal` of the plane `tool.stand_off` ahead of the pad, and
@@ -31,6 +34,22 @@ pub fn swept(scan: &Scan, contact_poses: &[Isometry3<f64>], tool: &Tool) -> Vec<
         });
     }
     swept
+}
+
+/// For each point of the scan whether the pad has passed over it in one of the motions, see
+/// [`swept`].
+#[must_use]
+pub fn swept_by<'a>(
+    scan: &Scan,
+    motions: impl IntoIterator<Item = Trajectory<'a>>,
+    arm: &Arm,
+) -> Vec<bool> {
+    let mut all = vec![false; scan.points.len()];
+    for motion in motions {
+        let now = swept(scan, &contact_motion(motion, arm), motion.tool);
+        all.iter_mut().zip(now).for_each(|(all, now)| *all |= now);
+    }
+    all
 }
 
 /// The share of swept points, 0 to 1; 0 without points.

@@ -2,5 +2,7 @@
 
 pub mod coverage;
 mod pads;
+mod segment;
 
 pub use pads::{Pad, contact_motion, pad_motion};
+pub use segment::distance_to_segment;

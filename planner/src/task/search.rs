@@ -17,9 +17,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::config::TaskConfig;
+use super::error::TaskError;
 use super::route::{PENALTY, Route, Task};
 use super::space::{Point, Space};
-use super::{TaskConfig, TaskError};
 use crate::progress::Progress;
 
 /// Poses from which charts grow.

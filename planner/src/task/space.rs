@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, Isometry3, Matrix6, Vector3, Vector6};
 use nullsweep_collision::{ToolContact, World};
 use nullsweep_robot::{Arm, Jacobian, JointVector, MAX_DOF, Tool};
 
-use super::Tolerance;
+use super::read::Tolerance;
 
 /// The arm, its tool and its tolerances.
 #[derive(Clone, Copy)]

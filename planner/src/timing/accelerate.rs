@@ -9,6 +9,7 @@ use super::run::{Piece, Run};
 use super::sampled::{Timed, braked, timed};
 use super::smooth::{cut, smooth};
 use crate::plan::{Plan, PlanKnot, Profile};
+use crate::sweep::distance_to_segment;
 use crate::workcell::Workcell;
 
 /// Farthest that the pad's centre may leave the planned line where a corner is blended: what
@@ -154,7 +155,7 @@ impl Judge<'_> {
         };
         let near = |q: &JointVector, other: Option<Point3<f64>>| {
             let end = other.unwrap_or(corner);
-            to_segment(&pad(q), &corner, &end) <= LINE_TOLERANCE
+            distance_to_segment(&pad(q), &corner, &end) <= LINE_TOLERANCE
         };
         let (before, after) = (
             self.plan.line(i - 1).filter(|_| self.plan.on_surface(i)),
@@ -196,11 +197,4 @@ impl Judge<'_> {
         };
         free(ToolContact::Forbidden) || (lifts() && free(ToolContact::Allowed))
     }
-}
-
-fn to_segment(p: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>) -> f64 {
-    let along = b - a;
-    let length = along.norm_squared();
-    let share = if length > 0.0 { ((p - a).dot(&along) / length).clamp(0.0, 1.0) } else { 0.0 };
-    (p - (a + along * share)).norm()
 }

@@ -1,7 +1,7 @@
 //! Collisions along every segment.
 
 use nalgebra::Point3;
-use nullsweep_collision::{ToolContact, World};
+use nullsweep_collision::{Exact, ToolContact};
 use nullsweep_robot::Arm;
 use rayon::prelude::*;
 
@@ -17,12 +17,11 @@ const LIFT: f64 = 0.052;
 pub(super) fn collisions(
     plan: &Plan,
     arm: &Arm,
-    world: &World,
+    exact: &Exact<'_>,
     tick: &(dyn Fn() + Sync),
 ) -> (Vec<Violation>, usize) {
-    let exact = world.exact();
     let lifts = lifts(plan, arm);
-    let per_segment: Vec<(Option<Violation>, usize)> = (1..plan.knots.len())
+    let per_segment: Vec<(Option<Violation>, usize)> = (0..plan.knots.len())
         .into_par_iter()
         .map(|k| {
             let curve = plan.curve(k);

@@ -1,9 +1,8 @@
-//! The finished plan, checked again by code that shares nothing with the search: a plan that
-//! fails is never published.
+//! The check as a whole.
 
 use nalgebra::{Isometry3, Point3};
-use nullsweep_collision::World;
-use nullsweep_robot::Arm;
+use nullsweep_collision::{CollisionError, Options, World};
+use nullsweep_robot::{Arm, ArmError, ArmSpec, Robot};
 use nullsweep_surface::scan::Scan;
 use nullsweep_surface::sheet::Surface;
 use rayon::prelude::*;
@@ -12,8 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::collisions::collisions;
 use super::kinematics::kinematics;
 use super::violation::{Violation, ViolationKind};
-use crate::plan::Plan;
-use crate::sweep::{coverage, pad_motion};
+use crate::plan::{Plan, Stretch};
+use crate::sweep::{Pad, coverage, pad_motion};
+use crate::workcell::Scene;
 
 /// The figures of a verified plan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,58 +29,99 @@ pub struct Verification {
     pub scan_distance_p95_m: f64,
     /// The largest of those. \[m\]
     pub scan_distance_max_m: f64,
-    /// Share of all scanned points that are swept.
+    /// Share of all scanned points that are swept, by this plan or by those that led to it.
     pub coverage_all: f64,
-    /// Share of the points of reachable patches that are swept.
+    /// Share of the points of reachable patches that are so swept.
     pub coverage_reachable: f64,
     /// For each scanned point whether it is swept.
     #[serde(skip)]
     pub swept: Vec<bool>,
 }
 
-/// Checks limits, times and collisions, and measures line, distance and swept coverage. `arm`
-/// and `scan` in the plan's stance: the root frame; `already` marks points that were swept before
-/// the plan begins. `tick` is called once a segment.
-#[must_use]
+/// What a plan is held against: the robot and the scene as they were given, none of what the search
+/// made of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Given<'a> {
+    /// The robot.
+    pub robot: &'a Robot,
+    /// Its arm.
+    pub arm: &'a ArmSpec,
+    /// What is there, in the floor frame.
+    pub scene: &'a Scene,
+    /// Collision margins and meshes.
+    pub collision: &'a Options,
+}
+
+/// Why a plan cannot be checked.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The arm cannot be made, or not with the plan's held joints.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
+    /// The collision check cannot be made.
+    #[error(transparent)]
+    Collision(#[from] CollisionError),
+    /// The plan is of another arm.
+    #[error("the plan is for joints {planned}, the arm has {found}")]
+    OtherArm {
+        /// The plan's joints.
+        planned: String,
+        /// The arm's joints.
+        found: String,
+    },
+    /// The plan is of another scan.
+    #[error("the plan was made for {planned} scanned points, the scene has {found}")]
+    OtherScan {
+        /// Points in the plan.
+        planned: usize,
+        /// Points in the scene.
+        found: usize,
+    },
+}
+
+/// Checks limits, times and collisions of a plan, and measures line, distance and swept coverage,
+/// all from its knots. `tick` is called once a segment.
+///
+/// # Errors
+/// The plan is of another robot or scan, or the collision check cannot be built. A plan that breaks
+/// a rule is no error.
 pub fn verify(
     plan: &Plan,
-    arm: &Arm,
-    world: &World,
-    scan: &Scan,
-    surface: &Surface,
-    already: &[bool],
+    given: Given<'_>,
     tick: &(dyn Fn() + Sync),
-) -> Verification {
-    let mut violations = kinematics(plan, arm);
-    let finite = !violations.iter().any(|v| v.kind == ViolationKind::NotFinite);
-    if !finite {
-        return Verification { violations, ..Verification::default() };
+) -> Result<Verification, VerifyError> {
+    let arm = arm_of(plan, given)?;
+    let scene = given.scene.transformed(&plan.base_pose().inverse());
+    let scan = &scene.surface;
+    let is_scanned = !scan.points.is_empty();
+    if is_scanned && plan.surface.len() != scan.points.len() {
+        let (planned, found) = (plan.surface.len(), scan.points.len());
+        return Err(VerifyError::OtherScan { planned, found });
     }
-    let (collisions, collision_checks) = collisions(plan, arm, world, tick);
+    let mut violations = kinematics(plan, &arm);
+    if violations.iter().any(|v| v.kind == ViolationKind::NotFinite) {
+        violations.sort_by_key(|v| v.knot);
+        return Ok(Verification { violations, ..Verification::default() });
+    }
+    let (points, obstacles) = (scene.points(), &scene.obstacles);
+    let world = World::new(given.robot, &arm, &plan.tool, &points, obstacles, given.collision)?;
+    let (collisions, collision_checks) = collisions(plan, &arm, &world.exact(), tick);
     violations.extend(collisions);
     violations.sort_by_key(|v| v.knot);
 
-    let pads = pad_motion(plan, arm);
+    let pads = pad_motion(plan.trajectory(), &arm);
     let line_deviation_max_m = pads.iter().map(|p| p.deviation).fold(0.0, f64::max);
-    let mut distances: Vec<f64> = pads
-        .par_iter()
-        .map(|p| {
-            let centre = Point3::from(p.pose.translation.vector);
-            (surface.distance(&centre) - plan.tool.stand_off).abs()
-        })
-        .collect();
-    distances.sort_by(f64::total_cmp);
+    let distances = if is_scanned { distances(plan, scan, &pads) } else { Vec::new() };
     let poses: Vec<Isometry3<f64>> = pads.iter().map(|p| p.pose).collect();
     let mut swept = coverage::swept(scan, &poses, &plan.tool);
-    for (now, before) in swept.iter_mut().zip(already) {
-        *now |= before;
-    }
+    let before = coverage::swept_by(scan, plan.past.iter().map(Stretch::trajectory), &arm);
+    swept.iter_mut().zip(before).for_each(|(now, before)| *now |= before);
     let share = |of: &dyn Fn(usize) -> bool| {
         let total = (0..swept.len()).filter(|&i| of(i)).count();
         let hit = (0..swept.len()).filter(|&i| of(i) && swept[i]).count();
         if total == 0 { 0.0 } else { hit as f64 / total as f64 }
     };
-    Verification {
+    Ok(Verification {
         violations,
         collision_checks,
         line_deviation_max_m,
@@ -89,7 +130,32 @@ pub fn verify(
         coverage_all: share(&|_| true),
         coverage_reachable: share(&|i| plan.surface[i].reachable),
         swept,
+    })
+}
+
+/// The arm as the plan has it: its held joints where the plan holds them.
+fn arm_of(plan: &Plan, given: Given<'_>) -> Result<Arm, VerifyError> {
+    let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
+    let arm = given.robot.arm(given.arm)?.with_held(&held)?;
+    if plan.joints != arm.joint_names() {
+        let (planned, found) = (plan.joints.join(", "), arm.joint_names().join(", "));
+        return Err(VerifyError::OtherArm { planned, found });
     }
+    Ok(arm)
+}
+
+/// Of the pad's centre from the scanned surface, less the stand-off, ascending. \[m\]
+fn distances(plan: &Plan, scan: &Scan, pads: &[Pad]) -> Vec<f64> {
+    let surface = Surface::new(scan);
+    let mut distances: Vec<f64> = pads
+        .par_iter()
+        .map(|p| {
+            let centre = Point3::from(p.pose.translation.vector);
+            (surface.distance(&centre) - plan.tool.stand_off).abs()
+        })
+        .collect();
+    distances.sort_by(f64::total_cmp);
+    distances
 }
 
 fn percentile(sorted: &[f64], share: f64) -> f64 {

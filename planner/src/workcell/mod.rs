@@ -3,9 +3,11 @@
 mod contact;
 mod reach;
 mod sample;
+mod scene;
 pub mod stance;
 
 pub use contact::{contact_pose, direction, heading_of, tangents};
 pub use reach::reach;
 pub use sample::{Sample, Workcell, middle_out, redundancies};
+pub use scene::Scene;
 pub use stance::{Stance, StanceSearch};

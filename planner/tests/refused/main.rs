@@ -5,9 +5,9 @@ mod pad;
 mod stage;
 
 use ViolationKind::{Acceleration, Collision, NotFinite, SoftLimit, TimeOrder, Velocity};
-use nullsweep_collision::World;
 use nullsweep_planner::plan::{Continues, Plan, PlanKnot, Profile};
 use nullsweep_planner::verify::ViolationKind;
+use nullsweep_planner::workcell::Scene;
 use stage::{detour, joint, judge, on_the_line, posture, retimed, spoilt, stage, stretched};
 
 /// A spoilt plan and what must be said of it.
@@ -15,7 +15,7 @@ struct Case {
     what: &'static str,
     plan: Plan,
     /// Instead of the stage's.
-    world: Option<World>,
+    scene: Option<Scene>,
     /// The first knot at which it is seen.
     knot: usize,
     /// Part of a detail.
@@ -26,7 +26,7 @@ struct Case {
 
 impl Case {
     fn new(what: &'static str, plan: Plan, knot: usize, says: impl Into<String>) -> Self {
-        Self { what, plan, world: None, knot, says: says.into(), also: &[] }
+        Self { what, plan, scene: None, knot, says: says.into(), also: &[] }
     }
 }
 
@@ -47,7 +47,7 @@ fn check(kind: ViolationKind) {
     let cases = cases(kind);
     assert!(cases.len() > 1);
     for case in cases {
-        let found = judge(&case.plan, case.world.as_ref().unwrap_or(&stage().world)).violations;
+        let found = judge(&case.plan, case.scene.as_ref().unwrap_or(&stage().scene)).violations;
         let (own, other): (Vec<_>, Vec<_>) = found.iter().partition(|v| v.kind == kind);
         let what = case.what;
         assert!(found.is_sorted_by_key(|v| v.knot), "{what}: not in order");
@@ -63,12 +63,12 @@ fn check(kind: ViolationKind) {
 #[test]
 fn the_unspoilt_plans_are_accepted() {
     let s = stage();
-    let whole = judge(&s.whole, &s.world);
-    assert_eq!(whole, s.said, "not the pipeline's world");
+    let whole = judge(&s.whole, &s.scene);
+    assert_eq!(whole, s.said, "not the pipeline's figures");
     for (plan, found) in [
         (&s.whole, whole),
-        (&s.bang, judge(&s.bang, &s.world)),
-        (&s.smooth, judge(&s.smooth, &s.world)),
+        (&s.bang, judge(&s.bang, &s.scene)),
+        (&s.smooth, judge(&s.smooth, &s.scene)),
     ] {
         assert_eq!(found.violations, []);
         assert!(plan.knots.len() > 100 && found.collision_checks >= plan.knots.len() - 1);
@@ -200,7 +200,7 @@ fn speeds() -> Vec<Case> {
 
 #[test]
 fn a_joint_just_within_its_velocity_is_accepted() {
-    assert_eq!(judge(&turning(0.999), &stage().world).violations, []);
+    assert_eq!(judge(&turning(0.999), &stage().scene).violations, []);
 }
 
 fn accelerations() -> Vec<Case> {
@@ -233,7 +233,7 @@ fn a_plan_that_goes_on_from_another_one_may_start_in_motion() {
     let j = joint("r_elbow_flex_joint");
     let mut plan = spoilt(&s.smooth, |knots| knots[0].v[j] = -1e-12);
     plan.continues = Some(Continues { digest: 1, knot: 1 });
-    assert_eq!(judge(&plan, &s.world).violations, []);
+    assert_eq!(judge(&plan, &s.scene).violations, []);
 }
 
 /// A start with the wrist so far beyond its upper end.
@@ -280,5 +280,5 @@ fn limits() -> Vec<Case> {
 
 #[test]
 fn a_joint_near_its_end_may_move_slowly() {
-    assert_eq!(judge(&slow(-0.01), &stage().world).violations, []);
+    assert_eq!(judge(&slow(-0.01), &stage().scene).violations, []);
 }

@@ -12,7 +12,7 @@ fn a_pad_beside_its_line_shows_in_the_deviation() {
     let beside =
         along.cross(&(pad(&s.bang.knots[k].q).rotation * Vector3::z())).normalize() * 0.003;
     let off = spoilt(&s.bang, |knots| knots[k].q = moved(knots[k].q, beside));
-    let (sound, off) = (judge(&s.bang, &s.world), judge(&off, &s.world));
+    let (sound, off) = (judge(&s.bang, &s.scene), judge(&off, &s.scene));
     assert!(sound.line_deviation_max_m < 2e-4, "{}", sound.line_deviation_max_m);
     assert!((off.line_deviation_max_m - 0.003).abs() < 1e-4, "{}", off.line_deviation_max_m);
 }
@@ -26,7 +26,7 @@ fn a_pad_off_the_surface_shows_in_distance_and_coverage() {
             knot.q = moved(knot.q, pad(&knot.q).rotation * Vector3::z() * -0.02);
         }
     });
-    let (sound, lifted) = (judge(&s.bang, &s.world), judge(&lifted, &s.world));
+    let (sound, lifted) = (judge(&s.bang, &s.scene), judge(&lifted, &s.scene));
     assert!(sound.scan_distance_max_m < 0.006, "{}", sound.scan_distance_max_m);
     for distance in [lifted.scan_distance_p95_m, lifted.scan_distance_max_m] {
         assert!((0.017..0.026).contains(&distance), "{distance}");

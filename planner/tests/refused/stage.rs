@@ -2,32 +2,25 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options, World};
 use nullsweep_planner::cost::velocities;
 use nullsweep_planner::pipeline::{Job, StanceChoice, run};
-use nullsweep_planner::plan::{CostKind, Method, Plan, PlanKnot, Profile};
+use nullsweep_planner::plan::{Plan, PlanKnot};
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::timing::{Limits, accelerate, bang_bang};
-use nullsweep_planner::tour::formulation::FormulationConfig;
-use nullsweep_planner::verify::{Verification, verify};
-use nullsweep_planner::workcell::Workcell;
-use nullsweep_planner::workcell::stance::Stance;
+use nullsweep_planner::verify::{Given, Verification, verify};
+use nullsweep_planner::workcell::{Scene, Stance, Workcell};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Tool};
-use nullsweep_surface::patches::PatchConfig;
-use nullsweep_surface::scan::{CleanConfig, Placement, Scan, clean_region, place};
-use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::scan::{CleanConfig, Placement, clean_region, place};
 use nullsweep_surface::simulate;
 
-/// A real plan for the chair's seat and all that it was made for, in the root frame.
+/// A real plan for the chair's seat and all that it was made for.
 pub(crate) struct Stage {
+    /// In its stance.
     pub(crate) arm: Arm,
-    pub(crate) world: World,
-    pub(crate) points: Vec<Point3<f64>>,
-    pub(crate) floor: Obstacle,
-    pub(crate) scan: Scan,
-    pub(crate) surface: Surface,
+    /// In the floor frame.
+    pub(crate) scene: Scene,
     /// The plan as it was made, with bang-bang velocity, and what the pipeline said of it.
     pub(crate) whole: Plan,
     pub(crate) said: Verification,
@@ -43,70 +36,53 @@ pub(crate) fn stage() -> &'static Stage {
         let view = simulate::chair(1);
         let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
         let seat = clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default()).unwrap();
+        let scene = Scene::from(seat);
         let held = vec![("torso_lift_joint".to_owned(), 0.1)];
         let stance = Stance { base: [-0.04, 0.574, 5.607], held };
         let to_root = stance.pose().inverse();
         let job = Job {
-            arm: ArmSpec::pr2(Side::Right),
-            tool: Tool::default(),
             stance: StanceChoice::Given(stance),
-            surroundings: seat.surroundings,
-            obstacles: vec![Obstacle::floor(Isometry3::identity())],
-            start: None,
-            after: None,
-            method: Method::Curvature,
-            cost: CostKind::Time,
             ik_samples: 12,
-            v_max: None,
-            profile: Profile::Velocity,
-            patches: PatchConfig::default(),
-            graph: GraphConfig::default(),
-            formulation: FormulationConfig::default(),
             refinements: 0,
-            collision: Options::default(),
-            seed: 1,
+            ..Job::new(ArmSpec::pr2(Side::Right))
         };
-        let made = run(&Robot::pr2(), &seat.surface, &job, &Silent).expect("a plan");
-        let surroundings = job.surroundings.iter().map(|p| to_root * p);
-        let points: Vec<_> = made.scan.points.iter().copied().chain(surroundings).collect();
-        let floor = Obstacle::floor(to_root);
-        let world = world(&made.arm, &points, std::slice::from_ref(&floor));
+        let robot = Robot::pr2();
+        let made = run(&robot, &scene, &job, &Silent).expect("a plan");
+        let there = scene.transformed(&to_root);
+        let (points, obstacles) = (there.points(), &there.obstacles);
+        let world =
+            World::new(&robot, &made.arm, &job.tool, &points, obstacles, &job.collision).unwrap();
         let cell = Workcell { arm: &made.arm, tool: &job.tool, world: &world };
         let mut bang = made.plan.clone();
         bang.knots.truncate(200);
         // What the pipeline does for the same job with the other profile.
         let smooth = accelerate(&bang, cell, &Limits::of(&made.arm, None), &[]);
         Stage {
-            points,
-            floor,
-            surface: Surface::new(&made.scan),
-            scan: made.scan,
+            scene,
             whole: made.plan,
             said: made.figures.verification,
             bang,
             smooth,
             arm: made.arm,
-            world,
         }
     })
 }
 
-pub(crate) fn world(arm: &Arm, points: &[Point3<f64>], obstacles: &[Obstacle]) -> World {
-    let options = Options::default();
-    World::new(&Robot::pr2(), arm, &Tool::default(), points, obstacles, &options).expect("a world")
-}
-
-/// The stage's world with a box in it.
-pub(crate) fn world_with(name: &str, half_extents: Vector3<f64>, centre: Vector3<f64>) -> World {
-    let (s, shape) = (stage(), ObstacleShape::Box { half_extents });
-    let pose = Isometry3::translation(centre.x, centre.y, centre.z);
-    let more = Obstacle { name: name.into(), shape, pose, carries_robot: false };
-    world(&s.arm, &s.points, &[s.floor.clone(), more])
-}
-
-pub(crate) fn judge(plan: &Plan, world: &World) -> Verification {
+/// The stage's scene with a box in it, placed in the root frame.
+pub(crate) fn scene_with(name: &str, half_extents: Vector3<f64>, centre: Vector3<f64>) -> Scene {
     let s = stage();
-    verify(plan, &s.arm, world, &s.scan, &s.surface, &vec![false; s.scan.points.len()], &|| ())
+    let shape = ObstacleShape::Box { half_extents };
+    let pose = s.bang.base_pose() * Isometry3::translation(centre.x, centre.y, centre.z);
+    let more = Obstacle { name: name.into(), shape, pose, carries_robot: false };
+    let mut scene = s.scene.clone();
+    scene.obstacles.push(more);
+    scene
+}
+
+pub(crate) fn judge(plan: &Plan, scene: &Scene) -> Verification {
+    let (robot, arm) = (&Robot::pr2(), &ArmSpec::pr2(Side::Right));
+    let given = Given { robot, arm, scene, collision: &Options::default() };
+    verify(plan, given, &|| ()).expect("it can be checked")
 }
 
 pub(crate) fn spoilt(plan: &Plan, spoil: impl FnOnce(&mut [PlanKnot])) -> Plan {

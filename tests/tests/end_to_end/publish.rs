@@ -95,7 +95,8 @@ fn a_plan_file_is_published_swept_and_continued() {
     let goal: JointVector = swung(&arm, &arm.home(), 0.2);
     let next = Sketch::through(&arm, &[sketch.posture(at), goal], 0.1);
     let mut second = plan(&arm, &next);
-    second.continues = Some(Continues { digest: first.digest(), knot: at as u32 });
+    second.continues =
+        Some(Continues { digest: first.digest().expect("short enough"), knot: at as u32 });
     let (code, said) = ended(publish(&stage, &write(&stage, "second.json", &second), &["--wait"]));
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("finished"), "{said}");

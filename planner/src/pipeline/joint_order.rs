@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use nullsweep_surface::patches::Patch;
 use rayon::prelude::*;
 
-use super::attempt::Shop;
+use super::attempt::Planning;
 use crate::cost::{Cost, Effort, TaskTime};
 use crate::motion::mover::lift_cost;
 use crate::plan::CostKind;
@@ -13,7 +13,7 @@ use crate::tour::formulation::{self, FormulationError, JUMP, Stop};
 use crate::tour::joint::{self, Cluster, JointConfig, Metric, Problem};
 use crate::workcell::redundancies;
 
-impl Shop<'_> {
+impl Planning<'_> {
     /// The tour by [`formulation::Method::Joint`] over the samples that are free of collision. The
     /// straight joint motion stands for the tracked one, which it bounds; a change of branch costs
     /// what lifting off does besides.

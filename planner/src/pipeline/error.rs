@@ -1,0 +1,102 @@
+//! Why there is no plan.
+
+use nullsweep_collision::CollisionError;
+use nullsweep_robot::ArmError;
+
+use crate::plan::PlanError;
+use crate::tour::formulation::FormulationError;
+use crate::verify::VerifyError;
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// The arm cannot be made from the robot.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
+    /// No order was found.
+    #[error(transparent)]
+    Formulation(#[from] FormulationError),
+    /// The collision world cannot be made.
+    #[error(transparent)]
+    Collision(#[from] CollisionError),
+    /// The plan to go on from cannot be named.
+    #[error("the plan to go on from: {0}")]
+    Plan(#[from] PlanError),
+    /// The finished plan cannot be checked.
+    #[error("checking the plan: {0}")]
+    Verify(#[from] VerifyError),
+    /// No patch was found.
+    #[error(
+        "no locally planar patch among {points} points: is the scale metres? try a larger patch (--patch-radius)"
+    )]
+    NoPatches {
+        /// How many points.
+        points: usize,
+    },
+    /// No stance reaches anything.
+    #[error(
+        "no stance of {tried} reaches any of the {patches} patches: is the object within the arm's height? try --torso or --base x,y,yaw"
+    )]
+    NoStance {
+        /// Stances tried with an exact look.
+        tried: usize,
+        /// How many patches.
+        patches: usize,
+    },
+    /// The body collides where it stands.
+    #[error("the robot collides where it stands: {hit}; choose another --base")]
+    StanceHit {
+        /// With what.
+        hit: String,
+    },
+    /// The arm collides where it starts.
+    #[error("the arm collides in its start posture: {hit}; give another --start")]
+    StartHit {
+        /// With what.
+        hit: String,
+    },
+    /// The start is outside the limits.
+    #[error(
+        "the start posture leaves the margined soft limits: {joint} at {value:.4}, limits {low:.4} … {high:.4}"
+    )]
+    StartLimit {
+        /// Which joint.
+        joint: String,
+        /// Where it is.
+        value: f64,
+        /// Its lower bound.
+        low: f64,
+        /// Its upper bound.
+        high: f64,
+    },
+    /// No patch can be reached.
+    #[error("none of the {patches} patches can be reached from base {base:?}: try --base auto")]
+    NothingReached {
+        /// How many patches.
+        patches: usize,
+        /// The stance.
+        base: [f64; 3],
+    },
+    /// No motion to any patch was found.
+    #[error(
+        "no motion from the start posture to any of the {reachable} reachable patches was found; give another --start"
+    )]
+    NoMotion {
+        /// How many patches are reachable.
+        reachable: usize,
+    },
+    /// The plan to go on from has swept everything.
+    #[error("every reachable patch is swept by knot {knot}: nothing is left to plan")]
+    NothingLeft {
+        /// The knot to go on from.
+        knot: usize,
+    },
+    /// The knot to go on from does not exist.
+    #[error("the plan to continue has {knots} knots, there is no knot {knot}")]
+    NoSuchKnot {
+        /// How many knots.
+        knots: usize,
+        /// Which was asked for.
+        knot: usize,
+    },
+}

@@ -1,0 +1,89 @@
+//! The figures of a run.
+
+use std::collections::BTreeMap;
+
+use nullsweep_robot::{Arm, JointVector};
+use serde::{Deserialize, Serialize};
+
+use super::attempt::Sequence;
+use crate::cost::{self, Effort};
+use crate::plan::Plan;
+use crate::roadmap::Graph;
+use crate::verify::Verification;
+
+/// Every figure of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Scanned points.
+    pub points: usize,
+    /// Patches.
+    pub patches: usize,
+    /// Patches that the arm reaches.
+    pub reachable: usize,
+    /// Patches put over what the others' sweep left out.
+    pub fill_in_patches: usize,
+    /// Pairs of neighbouring patches.
+    pub edge_candidates: usize,
+    /// Edges of the graph.
+    pub edges: usize,
+    /// Connected components of the graph.
+    pub components: usize,
+    /// x, y \[m\] and yaw \[rad\] of the robot's root frame in the floor frame.
+    pub base: [f64; 3],
+    /// Held joints that the stance sets. \[rad\] or \[m\]
+    pub held: BTreeMap<String, f64>,
+    /// Samples of the inverse kinematics that the layered graph had.
+    pub ik_samples_total: usize,
+    /// Sum of all joint displacements. \[rad\]
+    pub effort_rad: f64,
+    /// Duration of the plan. \[s\]
+    pub task_time_s: f64,
+    /// Length of the pad's path on the surface. \[m\]
+    pub distance_m: f64,
+    /// Length of the pad's path through free space. \[m\]
+    pub transfer_m: f64,
+    /// Seconds that each stage took.
+    pub calc_time_s: BTreeMap<String, f64>,
+    /// Seconds that all took.
+    pub calc_time_total_s: f64,
+    /// Knots of the plan.
+    pub knots: usize,
+    /// Motions through free space.
+    pub jumps: usize,
+    /// Reachable patches that no motion was found to.
+    pub dropped_patches: usize,
+    /// What the finished plan's check found.
+    #[serde(flatten)]
+    pub verification: Verification,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// What plan, graph and joint path say of themselves; the rest at its default.
+pub(super) fn figures(plan: &Plan, arm: &Arm, graph: &Graph, sequence: &Sequence) -> Figures {
+    let joints: Vec<JointVector> = plan.knots.iter().map(|k| k.q).collect();
+    Figures {
+        edge_candidates: graph.candidates,
+        edges: graph.edges.len(),
+        components: graph.components.len(),
+        ik_samples_total: sequence.samples,
+        effort_rad: cost::of_path(&Effort, &joints),
+        task_time_s: plan.duration(),
+        distance_m: pad_path(plan, arm, true),
+        transfer_m: pad_path(plan, arm, false),
+        knots: plan.knots.len(),
+        jumps: sequence.jumps(),
+        dropped_patches: sequence.dropped.len(),
+        ..Figures::default()
+    }
+}
+
+/// Length of the pad centre's path on the surface or off it. \[m\]
+fn pad_path(plan: &Plan, arm: &Arm, on_surface: bool) -> f64 {
+    let pad = plan.tool.on(arm);
+    plan.knots
+        .windows(2)
+        .filter(|w| (w[0].line.is_some() && w[1].line.is_some()) == on_surface)
+        .map(|w| (pad.centre(&w[1].q) - pad.centre(&w[0].q)).norm())
+        .sum()
+}

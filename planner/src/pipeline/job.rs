@@ -1,0 +1,111 @@
+//! What is to be planned.
+
+use nullsweep_collision::Options;
+use nullsweep_robot::{ArmSpec, JointVector, Tool};
+use nullsweep_surface::patches::PatchConfig;
+
+use crate::plan::{Continues, CostKind, Method, Plan, PlanError, Profile};
+use crate::roadmap::GraphConfig;
+use crate::tour::formulation::FormulationConfig;
+use crate::workcell::{Stance, StanceSearch};
+
+/// What is to be planned.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Base and tip link of the arm.
+    pub arm: ArmSpec,
+    /// The tool at its tip.
+    pub tool: Tool,
+    /// Where the robot stands.
+    pub stance: StanceChoice,
+    /// Where the arm is; `None`: a posture that the SRDF names (home before others), else the middle
+    /// of its ranges, or where it collides there the nearest free posture found. \[rad\] or \[m\]
+    pub start: Option<JointVector>,
+    /// A plan that this one goes on from.
+    pub after: Option<After>,
+    /// How the order is found.
+    pub method: Method,
+    /// What is minimised.
+    pub cost: CostKind,
+    /// Samples of the inverse kinematics at each tool pose, 1…
+    pub ik_samples: usize,
+    /// One velocity for all joints; `None`: the robot's limits. \[rad/s\]
+    pub v_max: Option<f64>,
+    /// How fast the plan goes along its path.
+    pub profile: Profile,
+    /// Patch extraction.
+    pub patches: PatchConfig,
+    /// Graph construction.
+    pub graph: GraphConfig,
+    /// Formulation.
+    pub formulation: FormulationConfig,
+    /// How often the plan is made again with patches over what it has not swept.
+    pub refinements: usize,
+    /// Collision margins and meshes.
+    pub collision: Options,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+impl Job {
+    /// The paper's setting for an arm: the default tool, the place where it reaches most, order by
+    /// Curvature-GTSP, least time, 100 samples of the inverse kinematics, bang-bang velocity.
+    #[must_use]
+    pub fn new(arm: ArmSpec) -> Self {
+        Self {
+            arm,
+            tool: Tool::default(),
+            stance: StanceChoice::Auto,
+            start: None,
+            after: None,
+            method: Method::Curvature,
+            cost: CostKind::Time,
+            ik_samples: 100,
+            v_max: None,
+            profile: Profile::Velocity,
+            patches: PatchConfig::default(),
+            graph: GraphConfig::default(),
+            formulation: FormulationConfig::default(),
+            refinements: 2,
+            collision: Options::default(),
+            seed: 1,
+        }
+    }
+}
+
+/// Where the robot stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StanceChoice {
+    /// Where it reaches most, as [`StanceSearch::of`] looks for it.
+    Auto,
+    /// Here.
+    Given(Stance),
+    /// Where it reaches most of what is searched.
+    Search(StanceSearch),
+}
+
+/// The plan and the knot that a new plan goes on from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct After {
+    /// The other plan.
+    pub plan: Plan,
+    /// The new plan's start, or the last knot that was passed.
+    pub knot: usize,
+    /// Where the arm was stopped past that knot and is held: then the plan starts there. \[rad\] or
+    /// \[m\]
+    pub held: Option<JointVector>,
+    /// Whether patches that the other plan, and those that led to it, have swept by then are swept
+    /// again.
+    pub again: bool,
+}
+
+impl After {
+    /// What the new plan says of where it takes over; nothing where the arm is held.
+    pub(super) fn continues(&self) -> Result<Option<Continues>, PlanError> {
+        let passing = || {
+            let digest = self.plan.digest()?;
+            Ok(Continues { digest, knot: self.knot as u32 })
+        };
+        self.held.is_none().then(passing).transpose()
+    }
+}

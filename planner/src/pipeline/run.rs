@@ -1,0 +1,168 @@
+//! The whole way from a scene to a verified plan, on one page.
+
+use nullsweep_collision::World;
+use nullsweep_robot::{Arm, JointVector, Robot};
+use nullsweep_surface::patches::{self, Patch};
+use nullsweep_surface::scan::Scan;
+use nullsweep_surface::sheet::Surface;
+
+use super::attempt::{Attempt, Planning};
+use super::clock::Clock;
+use super::error::PipelineError;
+use super::figures::{Figures, figures};
+use super::job::{After, Job};
+use super::setting::{Setting, settle};
+use super::start::{rest_before, start};
+use super::swept::{leave_out_swept, points_of, swept_before};
+use crate::cost;
+use crate::plan::{Plan, Profile};
+use crate::progress::Progress;
+use crate::roadmap::Graph;
+use crate::timing::{Limits, Rest, accelerate};
+use crate::verify::{Given, verify};
+use crate::workcell::{Sample, Scene, Workcell, reach};
+
+/// A plan with all that led to it, in the root frame.
+pub struct Outcome {
+    /// The plan. It may be published if `figures.verification.violations` is empty.
+    pub plan: Plan,
+    /// What it is like.
+    pub figures: Figures,
+    /// The arm in its stance.
+    pub arm: Arm,
+    /// The scan.
+    pub scan: Scan,
+    /// The patches.
+    pub patches: Vec<Patch>,
+    /// Which patches are reached.
+    pub reached: Vec<bool>,
+    /// The graph.
+    pub graph: Graph,
+}
+
+/// Plans the job for a scene in the floor frame.
+///
+/// # Errors
+/// See [`PipelineError`]. A plan that breaks a rule is no error: it comes with its violations.
+pub fn run(
+    robot: &Robot,
+    scene: &Scene,
+    job: &Job,
+    progress: &dyn Progress,
+) -> Result<Outcome, PipelineError> {
+    let mut clock = Clock::default();
+    let free_arm = robot.arm(&job.arm)?;
+    progress.stage("patches", None);
+    let surface = &scene.surface;
+    let patches = clock.time("patches", || patches::find(surface, &job.patches, job.seed));
+    if patches.is_empty() {
+        return Err(PipelineError::NoPatches { points: surface.points.len() });
+    }
+
+    progress.stage("stance", None);
+    let setting = clock.time("stance", || settle(robot, &free_arm, scene, &patches, job))?;
+    let Setting { stance, arm, scan, patches, world } = setting;
+    for note in world.notes() {
+        progress.note(note);
+    }
+    let (start, rest) = begin(job, &arm, &world, progress)?;
+    let already = swept_before(job, rest.as_ref(), &arm, &scan)?;
+
+    let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
+    progress.stage("reach", Some(patches.len()));
+    let reached =
+        clock.time("reach", || reach(cell, &patches, job.ik_samples, &|| progress.tick()));
+    let mut reachable: Vec<bool> = reached.iter().map(Option::is_some).collect();
+    if !reachable.contains(&true) {
+        return Err(PipelineError::NothingReached { patches: patches.len(), base: stance.base });
+    }
+    let (found, samples) = (patches.len(), reached);
+    let surface = clock.time("surface", || Surface::new(&scan));
+    let planning = Planning {
+        robot,
+        job,
+        stance: &stance,
+        cell,
+        scan: &scan,
+        surface: &surface,
+        start,
+        velocity: cost::velocities(&arm, job.v_max),
+        continues: job.after.as_ref().map_or(Ok(None), After::continues)?,
+        to_sweep: &points_of(&scan, &patches, &reachable),
+        already: &already,
+        progress,
+    };
+    let best = search(&planning, patches, samples, &mut clock)?;
+    let Attempt { patches, graph, sequence, mut plan, .. } = best;
+    if job.profile == Profile::Acceleration {
+        progress.stage("timing", None);
+        plan = clock.time("timing", || accelerate(&plan, cell, &Limits::of(&arm, job.v_max), &[]));
+        if let Some(rest) = rest {
+            plan = rest.then(plan);
+        }
+    }
+
+    progress.stage("verify", Some(plan.knots.len()));
+    let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
+    let verification = clock.time("verify", || verify(&plan, given, &|| progress.tick()))?;
+    let figures = Figures {
+        points: scan.points.len(),
+        patches: found,
+        reachable: reachable.iter().filter(|r| **r).count(),
+        fill_in_patches: patches.len() - found,
+        base: stance.base,
+        held: stance.held.into_iter().collect(),
+        calc_time_total_s: clock.0.values().sum(),
+        calc_time_s: clock.0,
+        verification,
+        seed: job.seed,
+        ..figures(&plan, &arm, &graph, &sequence)
+    };
+    reachable.resize(patches.len(), true);
+    Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
+}
+
+/// Where the arm begins; for a plan that joins another one in motion, after the way to rest on the
+/// other one's path.
+fn begin(
+    job: &Job,
+    arm: &Arm,
+    world: &World,
+    progress: &dyn Progress,
+) -> Result<(JointVector, Option<Rest>), PipelineError> {
+    let start = start(job, arm, world)?;
+    if let Some(note) = start.note {
+        progress.note(&note);
+    }
+    let rest = rest_before(job, arm);
+    let at_rest = rest.as_ref().and_then(|rest| rest.knots.last()).map(|knot| knot.q);
+    Ok((at_rest.unwrap_or(start.q), rest))
+}
+
+/// The best of some attempts, each with patches over what the one before has left out, and side
+/// trips to what remains.
+fn search(
+    planning: &Planning<'_>,
+    patches: Vec<Patch>,
+    mut visit: Vec<Option<Sample>>,
+    clock: &mut Clock,
+) -> Result<Attempt, PipelineError> {
+    let job = planning.job;
+    if let Some(after) = job.after.as_ref().filter(|after| !after.again) {
+        leave_out_swept(&mut visit, &patches, planning.already);
+        if !visit.iter().any(Option::is_some) {
+            return Err(PipelineError::NothingLeft { knot: after.knot });
+        }
+    }
+    let mut best = planning.attempt(patches, visit, None, clock)?;
+    for _ in 0..job.refinements {
+        let Some((patches, visit)) = planning.refine(&best, clock) else { break };
+        let next = planning.attempt(patches, visit, Some(&best), clock)?;
+        if next.swept_points() <= best.swept_points() {
+            break;
+        }
+        best = next;
+    }
+    planning.complete(&mut best, clock);
+    Ok(best)
+}

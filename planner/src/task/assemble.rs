@@ -1,0 +1,65 @@
+//! A route through given poses as a plan.
+
+use nalgebra::{Isometry3, UnitVector3, Vector3};
+use nullsweep_robot::{Arm, JointVector, Robot};
+
+use super::config::TaskConfig;
+use super::route::Route;
+use crate::plan::{CostKind, FORMAT, Held, Method, Plan, PlanKnot, Profile, SurfaceSample};
+use crate::{cost, timing};
+
+/// The route as a plan.
+pub(super) fn assemble(
+    robot: &Robot,
+    arm: &Arm,
+    poses: &[Isometry3<f64>],
+    route: &Route,
+    edges: &[Option<Vec<JointVector>>],
+    config: &TaskConfig,
+) -> Plan {
+    let knot = |q, line, patch| PlanKnot { time_ns: 0, q, v: JointVector::default(), line, patch };
+    let mut knots: Vec<PlanKnot> = Vec::new();
+    for (k, &pose) in route.order.iter().enumerate() {
+        let point = &route.points[pose];
+        let through = k.checked_sub(1).and_then(|e| edges[e].as_ref());
+        if let Some([_, between @ .., _]) = through.map(Vec::as_slice) {
+            knots.extend(between.iter().map(|q| knot(*q, None, None)));
+        }
+        let at = point.tool.translation.vector;
+        let line = Some([at.x, at.y, at.z]);
+        knots.push(knot(point.q, line, Some(pose as u32)));
+    }
+    let velocity = cost::velocities(arm, config.v_max);
+    let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
+    for (knot, time) in knots.iter_mut().zip(timing::bang_bang(&joints, &velocity)) {
+        knot.time_ns = time;
+    }
+    Plan {
+        format: FORMAT,
+        robot: robot.name().into(),
+        fingerprint: arm.fingerprint(),
+        joints: arm.joint_names().to_vec(),
+        held: Held::all_of(arm),
+        tool: config.tool.clone(),
+        base: [0.0; 3],
+        method: Method::Tsp,
+        cost: CostKind::Effort,
+        profile: Profile::Velocity,
+        seed: config.seed,
+        knots,
+        patches: poses.iter().map(|p| p.translation.vector.into()).collect(),
+        surface: poses.iter().map(place).collect(),
+        continues: None,
+        past: Vec::new(),
+    }
+}
+
+/// A pose's origin, its normal against the tool's axis.
+fn place(pose: &Isometry3<f64>) -> SurfaceSample {
+    let normal = UnitVector3::new_normalize(pose.rotation * -Vector3::z());
+    SurfaceSample {
+        point: pose.translation.vector.into(),
+        normal: normal.into_inner().into(),
+        reachable: true,
+    }
+}

@@ -1,0 +1,47 @@
+//! What is to be planned through given poses.
+
+use nullsweep_collision::{Obstacle, Options};
+use nullsweep_robot::{ArmSpec, Tool};
+
+use super::read::Tolerance;
+
+/// What is to be planned.
+#[derive(Clone, Debug)]
+pub struct TaskConfig {
+    /// Base and tip link of the arm.
+    pub arm: ArmSpec,
+    /// The tool; its contact frame is what meets the poses.
+    pub tool: Tool,
+    /// How near is met.
+    pub tolerance: Tolerance,
+    /// Positions of joints outside the arm. \[rad\] or \[m\]
+    pub held: Vec<(String, f64)>,
+    /// Solid things, in the robot's root frame.
+    pub obstacles: Vec<Obstacle>,
+    /// Collision margins and meshes.
+    pub collision: Options,
+    /// One velocity for all joints; `None`: the robot's limits. \[rad/s\]
+    pub v_max: Option<f64>,
+    /// Rounds of order and relaxation.
+    pub rounds: usize,
+    /// Trials of the order's search for each pose in each round.
+    pub trials: u64,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+/// A tool for poses that speak of the tip frame itself: a cube of 1 cm behind its origin, z ahead.
+#[must_use]
+pub fn tip_tool() -> Tool {
+    Tool {
+        name: "tip".into(),
+        length: 0.01,
+        width: 0.01,
+        thickness: 0.01,
+        centre: [0.0; 3],
+        approach: [0.0, 0.0, 1.0],
+        across: [0.0, 1.0, 0.0],
+        symmetric: false,
+        ..Tool::default()
+    }
+}

@@ -1,0 +1,46 @@
+//! Why there is no plan through given poses.
+
+use nullsweep_collision::CollisionError;
+use nullsweep_gtsp::{InstanceError, SolveError};
+use nullsweep_robot::ArmError;
+
+use crate::verify::VerifyError;
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum TaskError {
+    /// The arm cannot be used.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
+    /// Collisions cannot be checked.
+    #[error(transparent)]
+    Collision(#[from] CollisionError),
+    /// No joint vector was found for any pose.
+    #[error(
+        "none of the {poses} poses is met by the arm inside its limits and free of collision: are \
+         they in the robot's root frame, and is the tip link right?"
+    )]
+    NothingMet {
+        /// How many there are.
+        poses: usize,
+    },
+    /// No way through free space between two poses.
+    #[error(
+        "no motion through free space was found from pose {from} to pose {to}: try another --seed"
+    )]
+    NoTransfer {
+        /// The pose before.
+        from: usize,
+        /// The pose after.
+        to: usize,
+    },
+    /// The finished plan cannot be checked.
+    #[error("checking the plan: {0}")]
+    Verify(#[from] VerifyError),
+    /// The order's search.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// The order's search.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
