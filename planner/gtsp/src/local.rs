@@ -111,8 +111,7 @@ impl LocalSearch {
     }
 
     fn improve(&mut self, table: &Table, tour: &mut Order, c: u32) -> bool {
-        let m = tour.order.len();
-        if m < super::search::SMALL {
+        if table.is_small() {
             return false;
         }
         let mut best = (0_i64, None);

@@ -1,6 +1,7 @@
 //! The tour under search: order, chosen nodes and cached arcs.
 
 use crate::table::Table;
+use crate::tour::Tour;
 
 /// Order of the clusters with the root first, chosen nodes, and the cost in the table's units.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -26,6 +27,33 @@ impl Order {
         let mut tour = Self { order, position, chosen, arcs, slack, cost: 0 };
         tour.refresh_all(table);
         tour
+    }
+
+    /// The tour under search of a public form, in a table of all nodes.
+    pub(super) fn from_tour(table: &Table, tour: &Tour) -> Self {
+        let root = table.outer_root.then_some(table.root as u32);
+        let mut order: Vec<u32> =
+            root.into_iter().chain(tour.clusters.iter().map(|&c| c as u32)).collect();
+        // A closed tour from outside may begin anywhere.
+        let root = order.iter().position(|&c| c as usize == table.root).unwrap_or(0);
+        order.rotate_left(root);
+        let mut chosen = vec![0; table.m];
+        for (&c, &node) in tour.clusters.iter().zip(&tour.nodes) {
+            chosen[c] = node as u32;
+        }
+        Self::new(table, order, chosen)
+    }
+
+    /// The public form, with the nodes that the instance has.
+    pub(super) fn to_tour(&self, table: &Table) -> Tour {
+        let clusters = &self.order[usize::from(table.outer_root)..];
+        Tour {
+            clusters: clusters.iter().map(|&c| c as usize).collect(),
+            nodes: clusters
+                .iter()
+                .map(|&c| table.instance_node(c, self.chosen[c as usize]) as usize)
+                .collect(),
+        }
     }
 
     /// Brings the cached arcs and the cost up to date.

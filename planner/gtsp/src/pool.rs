@@ -1,5 +1,6 @@
 //! A pool of local optima that is crossed until it agrees.
 
+use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -7,8 +8,8 @@ use rayon::prelude::*;
 use crate::eax::Crossover;
 use crate::local::LocalSearch;
 use crate::order::Order;
-use crate::search::{Cooling, SMALL, construct, iterate, settle};
-use crate::solve::{Record, Streams};
+use crate::record::Record;
+use crate::search::{Cooling, construct, iterate, settle};
 use crate::table::Table;
 
 /// Tours in the first epoch's pool; later epochs double it up to three times.
@@ -19,6 +20,26 @@ const TRIALS_PER_CLUSTER: u64 = 5;
 const CHILDREN: usize = 30;
 /// Generations without an improvement that end an epoch.
 const IDLE_GENERATIONS: u32 = 3;
+
+/// Random streams of one seed, handed out in a fixed order before the threads start.
+pub(super) struct Streams {
+    seed: u64,
+    next: u64,
+}
+
+impl Streams {
+    pub(super) fn new(seed: u64) -> Self {
+        Self { seed, next: 0 }
+    }
+
+    /// A generator that no other task shares.
+    fn next(&mut self) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(self.next);
+        self.next += 1;
+        rng
+    }
+}
 
 /// How large an epoch may be.
 #[derive(Clone, Copy)]
@@ -46,7 +67,7 @@ pub(super) fn evolve(
     // Small budgets get small pools: half of the trials are left for the crossing.
     let sure = limit.min(likely);
     let size = size.min(sure / 64).max(1) as usize;
-    let size = if table.m < SMALL { 1 } else { size };
+    let size = if table.is_small() { 1 } else { size };
     let trials = (TRIALS_PER_CLUSTER * table.m as u64).min(sure / (2 * size as u64));
     let tasks: Vec<_> = (0..size).map(|k| (k, streams.next())).collect();
     let fresh: Vec<(Order, u64)> = tasks
@@ -65,7 +86,7 @@ pub(super) fn evolve(
         .collect();
     record.made += fresh.iter().map(|(_, made)| made).sum::<u64>();
     let mut pool: Vec<Order> = fresh.into_iter().map(|(tour, _)| tour).collect();
-    record.offer(table.tour(&pool[best_of(&pool)]));
+    record.offer(pool[best_of(&pool)].to_tour(table));
     let end = record.made.saturating_add(limit.saturating_sub(trials * size as u64));
     cross_until_idle(table, &mut pool, end, streams, stop, record);
     let winner = best_of(&pool);
@@ -87,7 +108,7 @@ fn cross_until_idle(
     stop: &(dyn Fn() -> bool + Sync),
     record: &mut Record<'_, '_>,
 ) {
-    if table.m < SMALL {
+    if table.is_small() {
         return; // Each tour is an optimum already.
     }
     let mut idle = 0;
@@ -112,7 +133,7 @@ fn cross_until_idle(
                 idle = 0;
             }
         }
-        record.offer(table.tour(&pool[best_of(pool)]));
+        record.offer(pool[best_of(pool)].to_tour(table));
     }
 }
 

@@ -7,8 +7,6 @@ use crate::local::LocalSearch;
 use crate::order::Order;
 use crate::table::Table;
 
-/// Tours of fewer clusters, the root's included, are enumerated.
-pub(super) const SMALL: usize = 9;
 /// Longest of the two stretches that a kick exchanges.
 const KICK: usize = 30;
 
@@ -111,8 +109,7 @@ pub(super) fn iterate(
     rng: &mut ChaCha8Rng,
     stop: &dyn Fn() -> bool,
 ) -> u64 {
-    let m = table.m;
-    if m < SMALL {
+    if table.is_small() {
         enumerate(table, local, tour);
         return 0;
     }

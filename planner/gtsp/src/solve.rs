@@ -1,6 +1,5 @@
 //! The solver's front: budget, progress, cancellation, and the rounds of the search.
 
-use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -12,8 +11,9 @@ use crate::exact;
 use crate::instance::Instance;
 use crate::local::LocalSearch;
 use crate::order::Order;
-use crate::pool::{Epoch, evolve};
-use crate::search::{Cooling, SMALL, construct, iterate, settle};
+use crate::pool::{Epoch, Streams, evolve};
+use crate::record::{Observer, Progress, Record};
+use crate::search::{Cooling, construct, iterate, settle};
 use crate::table::Table;
 use crate::thin::{Thinned, polish};
 use crate::tour::{Tour, TourCost};
@@ -44,19 +44,6 @@ impl Budget {
     pub fn time(time: Duration) -> Self {
         Self { trials: None, time: Some(time), threads: 0, target: None }
     }
-}
-
-/// State of the search, told whenever the best tour has improved.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress<'a> {
-    /// Best tour so far.
-    pub tour: &'a Tour,
-    /// Its cost.
-    pub cost: TourCost,
-    /// Time since the start.
-    pub elapsed: Duration,
-    /// Trials made.
-    pub trials: u64,
 }
 
 /// The best tour found.
@@ -97,9 +84,6 @@ pub enum SolveError {
         threads: usize,
     },
 }
-
-/// Takes the progress; `Break` ends the search.
-pub type Observer<'a> = dyn FnMut(&Progress<'_>) -> ControlFlow<()> + Send + 'a;
 
 /// Watches and stops a search from outside.
 #[derive(Default)]
@@ -173,20 +157,12 @@ pub(super) fn rounds(
             || cancel.is_some_and(|c| c.load(Ordering::Relaxed))
             || budget.time.is_some_and(|t| started.elapsed() >= t)
     };
-    let mut record = Record {
-        instance,
-        best: None,
-        made: 0,
-        target: budget.target,
-        progress: control.progress,
-        started,
-        stopped: &stopped,
-    };
-    let mut streams = Streams { seed, next: 0 };
+    let mut record = Record::new(instance, budget.target, control.progress, started, &stopped);
+    let mut streams = Streams::new(seed);
     let limit = budget.trials.unwrap_or(u64::MAX);
     let mut elite: Vec<Order> = Vec::new();
     if let Some(start) = control.start.filter(|start| start.check(instance).is_ok()) {
-        elite.push(full.order(start));
+        elite.push(Order::from_tour(&full, start));
         record.offer(start.clone());
     }
     for number in 0.. {
@@ -206,20 +182,20 @@ pub(super) fn rounds(
                 elite.iter().map(|tour| thinned.inside(&table, tour)).collect();
             evolve(&table, epoch(&table), &mut inside, &mut streams, &stop, &mut record);
             if !stopped.load(Ordering::Relaxed) {
-                elite.extend(inside.last().map(|winner| polish(&full, &table.tour(winner))));
-                let best = record.best.as_ref().map(|(tour, _)| polish(&full, tour));
-                best.iter().for_each(|best| record.offer(full.tour(best)));
+                elite.extend(inside.last().map(|winner| polish(&full, &winner.to_tour(&table))));
+                let best = record.best().map(|tour| polish(&full, tour).to_tour(&full));
+                best.into_iter().for_each(|best| record.offer(best));
             }
         } else {
             evolve(&full, epoch(&full), &mut elite, &mut streams, &stop, &mut record);
         }
         // So few clusters are enumerated: one epoch has the optimum.
-        if record.made >= limit || stop() || full.m < SMALL {
+        if record.made >= limit || stop() || full.is_small() {
             break;
         }
     }
     let made = record.made;
-    let (tour, cost) = record.best.expect("every epoch records a tour");
+    let (tour, cost) = record.into_best().expect("every epoch records a tour");
     let lower_bound = lower_bound(instance);
     Solution { tour, cost, trials: made, elapsed: started.elapsed(), lower_bound }
 }
@@ -235,51 +211,4 @@ fn trials_a_second(table: &Table, seed: u64) -> f64 {
     let started = Instant::now();
     iterate(table, &mut local, &mut tour, cooling, &mut rng, &|| false);
     TRIALS as f64 / started.elapsed().as_secs_f64().max(1e-9)
-}
-
-/// Random streams of one seed, handed out in a fixed order before the threads start.
-pub(super) struct Streams {
-    pub(super) seed: u64,
-    pub(super) next: u64,
-}
-
-impl Streams {
-    /// A generator that no other task shares.
-    pub(super) fn next(&mut self) -> ChaCha8Rng {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        rng.set_stream(self.next);
-        self.next += 1;
-        rng
-    }
-}
-
-/// Keeps the best tour by its true cost and tells the observer.
-pub(super) struct Record<'a, 'b> {
-    instance: &'a Instance,
-    best: Option<(Tour, TourCost)>,
-    /// Trials made so far.
-    pub(super) made: u64,
-    target: Option<f64>,
-    progress: Option<&'b mut Observer<'b>>,
-    started: Instant,
-    stopped: &'a AtomicBool,
-}
-
-impl Record<'_, '_> {
-    /// Considers a tour of the search.
-    pub(super) fn offer(&mut self, tour: Tour) {
-        let cost = tour.cost(self.instance);
-        if self.best.as_ref().is_some_and(|(_, best)| !cost.better_than(best)) {
-            return;
-        }
-        let mut end = self.target.is_some_and(|t| cost.total() <= t);
-        if let Some(progress) = &mut self.progress {
-            let elapsed = self.started.elapsed();
-            end |= progress(&Progress { tour: &tour, cost, elapsed, trials: self.made }).is_break();
-        }
-        self.best = Some((tour, cost));
-        if end {
-            self.stopped.store(true, Ordering::Relaxed);
-        }
-    }
 }

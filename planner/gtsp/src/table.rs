@@ -6,14 +6,14 @@
 //! is always taken from the instance.
 
 use crate::instance::{Ends, Instance, Jump};
-use crate::order::Order;
 use crate::raw::{Raw, statistics};
-use crate::tour::Tour;
 
 /// Jump price in the search, in units of the largest arc worth having.
 const JUMP_FACTOR: f64 = 4.0;
 /// Length of a candidate list.
 const NEAR: usize = 10;
+/// Instances of fewer clusters, the root's included, are enumerated.
+const SMALL: usize = 9;
 /// Costs that are handled side by side; blocks may be read this far past their end.
 pub(super) const LANES: usize = 8;
 
@@ -39,7 +39,7 @@ pub(super) struct Table {
     near_in_cost: Vec<i32>,
     near_start: Vec<(u32, u32)>,
     /// The root is the fixed start outside the clusters.
-    outer_root: bool,
+    pub(super) outer_root: bool,
     /// No arc leads to the root but the closing one, which is free.
     open: bool,
     /// The instance's nodes that this table's stand for, where it has not all of them.
@@ -245,6 +245,12 @@ impl Table {
         table
     }
 
+    /// Whether there are so few clusters that their orders are enumerated.
+    #[inline]
+    pub(super) fn is_small(&self) -> bool {
+        self.m < SMALL
+    }
+
     /// Whether arcs from `a` to `b` are known one by one.
     pub(super) fn is_stored(&self, a: u32, b: u32) -> bool {
         self.pairs[a as usize * self.m + b as usize].at != 0
@@ -386,31 +392,9 @@ impl Table {
         self.near_in[range.clone()].iter().copied().zip(self.near_in_cost[range].iter().copied())
     }
 
-    /// The public form of a tour under search.
-    pub(super) fn tour(&self, tour: &Order) -> Tour {
-        let clusters = &tour.order[usize::from(self.outer_root)..];
-        let node = |c: u32| {
-            let node = tour.chosen[c as usize];
-            self.names.as_ref().map_or(node, |names| names[c as usize][node as usize])
-        };
-        Tour {
-            clusters: clusters.iter().map(|&c| c as usize).collect(),
-            nodes: clusters.iter().map(|&c| node(c) as usize).collect(),
-        }
-    }
-
-    /// The tour under search of a public form, in a table of all nodes.
-    pub(super) fn order(&self, tour: &Tour) -> Order {
-        let root = self.outer_root.then_some(self.root as u32);
-        let mut order: Vec<u32> =
-            root.into_iter().chain(tour.clusters.iter().map(|&c| c as u32)).collect();
-        // A closed tour from outside may begin anywhere.
-        let root = order.iter().position(|&c| c as usize == self.root).unwrap_or(0);
-        order.rotate_left(root);
-        let mut chosen = vec![0; self.m];
-        for (&c, &node) in tour.clusters.iter().zip(&tour.nodes) {
-            chosen[c] = node as u32;
-        }
-        Order::new(self, order, chosen)
+    /// The instance's node that node `i` of cluster `c` stands for.
+    #[inline]
+    pub(super) fn instance_node(&self, c: u32, i: u32) -> u32 {
+        self.names.as_ref().map_or(i, |names| names[c as usize][i as usize])
     }
 }

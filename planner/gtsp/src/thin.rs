@@ -7,7 +7,7 @@
 
 use crate::local::LocalSearch;
 use crate::order::Order;
-use crate::search::{SMALL, settle};
+use crate::search::settle;
 use crate::table::Table;
 use crate::tour::Tour;
 
@@ -27,7 +27,7 @@ pub(super) struct Thinned {
 impl Thinned {
     /// The nodes that matter; `None` where no cluster is wide, or all tours are enumerated.
     pub(super) fn new(full: &Table) -> Option<Self> {
-        if full.m < SMALL || full.sizes.iter().all(|&size| size <= WIDE) {
+        if full.is_small() || full.sizes.iter().all(|&size| size <= WIDE) {
             return None;
         }
         let mut kept: Vec<Vec<bool>> =
@@ -80,7 +80,7 @@ impl Thinned {
 
 /// The tour with all nodes to choose from, brought to a local optimum.
 pub(super) fn polish(full: &Table, tour: &Tour) -> Order {
-    let mut polished = full.order(tour);
+    let mut polished = Order::from_tour(full, tour);
     settle(full, &mut LocalSearch::new(full.m), &mut polished);
     polished
 }

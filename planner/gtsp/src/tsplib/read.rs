@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::super::instance::{Costs, Ends, Instance, Jump, OnDemand};
-use super::super::tour::Tour;
-use super::TsplibError;
+use super::error::TsplibError;
 use super::weights::{WeightFormat, WeightType};
+use crate::instance::{CostFn, Costs, Ends, Instance, Jump, OnDemand};
+use crate::tour::Tour;
 
 /// Largest number of nodes whose explicit matrix is read: 3.6 GB as f64 would be too much to
 /// promise.
@@ -343,7 +343,7 @@ impl Header {
         };
         let numbers = Arc::new(members);
         let of = Arc::clone(&numbers);
-        let cost: super::super::instance::CostFn = if weight == WeightType::Explicit {
+        let cost: CostFn = if weight == WeightType::Explicit {
             match self.matrix.ok_or(missing("EDGE_WEIGHT_SECTION"))? {
                 Matrix::Whole(w) => {
                     Arc::new(move |a, i, b, j| f64::from(w[of[a][i] * n + of[b][j]]))

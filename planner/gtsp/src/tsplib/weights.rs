@@ -2,7 +2,7 @@
 
 /// `EDGE_WEIGHT_TYPE`: how weights follow from coordinates (Reinelt, TSPLIB 95, section 2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WeightType {
+pub(super) enum WeightType {
     /// Given in the file.
     Explicit,
     /// Euclidean in the plane, rounded to the nearest integer.
@@ -29,7 +29,7 @@ pub enum WeightType {
 
 impl WeightType {
     /// The type of this name; `None` for those without a formula here (XRAY1, XRAY2, SPECIAL).
-    pub fn from_name(name: &str) -> Option<Self> {
+    pub(super) fn from_name(name: &str) -> Option<Self> {
         Some(match name {
             "EXPLICIT" => Self::Explicit,
             "EUC_2D" => Self::Euc2d,
@@ -47,7 +47,7 @@ impl WeightType {
     }
 
     /// Numbers that a node's coordinates consist of.
-    pub fn dimensions(self) -> usize {
+    pub(super) fn dimensions(self) -> usize {
         match self {
             Self::Explicit => 0,
             Self::Euc3d | Self::Max3d | Self::Man3d => 3,
@@ -56,7 +56,7 @@ impl WeightType {
     }
 
     /// Distance of two points; 0 for explicit weights.
-    pub fn distance(self, a: [f64; 3], b: [f64; 3]) -> f64 {
+    pub(super) fn distance(self, a: [f64; 3], b: [f64; 3]) -> f64 {
         let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
         let squares = d[0] * d[0] + d[1] * d[1];
         let nearest = |x: f64| (x + 0.5).floor();
@@ -97,7 +97,7 @@ fn geographical(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// `EDGE_WEIGHT_FORMAT`: which entries of the matrix a file lists, in which order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WeightFormat {
+pub(super) enum WeightFormat {
     /// All of it, row by row.
     FullMatrix,
     /// A triangle: above the diagonal or below it, with the diagonal or without, by rows or columns.
@@ -113,7 +113,7 @@ pub enum WeightFormat {
 
 impl WeightFormat {
     /// The format of this name; `None` for FUNCTION and unknown ones.
-    pub fn from_name(name: &str) -> Option<Self> {
+    pub(super) fn from_name(name: &str) -> Option<Self> {
         let triangle = |upper, diagonal, rows| Some(Self::Triangle { upper, diagonal, rows });
         match name {
             "FULL_MATRIX" => Some(Self::FullMatrix),
@@ -130,7 +130,7 @@ impl WeightFormat {
     }
 
     /// Entries listed for `n` nodes.
-    pub fn entries(self, n: usize) -> usize {
+    pub(super) fn entries(self, n: usize) -> usize {
         match self {
             Self::FullMatrix => n * n,
             Self::Triangle { diagonal: true, .. } => n * (n + 1) / 2,
@@ -139,7 +139,7 @@ impl WeightFormat {
     }
 
     /// The full row-major matrix of a list of entries.
-    pub fn expand<T: Copy + Default>(self, n: usize, entries: Vec<T>) -> Vec<T> {
+    pub(super) fn expand<T: Copy + Default>(self, n: usize, entries: Vec<T>) -> Vec<T> {
         let Self::Triangle { upper, diagonal, rows } = self else { return entries };
         let mut matrix = vec![T::default(); n * n];
         let mut list = entries.into_iter();

@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
-use super::super::closed::Closed;
-use super::super::instance::Instance;
-use super::super::tour::Tour;
+use crate::closed::Closed;
+use crate::instance::Instance;
+use crate::tour::Tour;
 
 /// What the numbers in a written file stand for.
 #[derive(Clone, Debug, PartialEq)]
