@@ -1,7 +1,7 @@
 //! GTSP solver: trials of the search on made instances, against the transformation on the same ones.
 //!
-//! Run with `cargo bench -p nullsweep-planner --bench gtsp`. One item is one trial, so the reports
-//! compare as trials a second whatever the budget; both roads get the same number of trials.
+//! Run with `cargo bench -p nullsweep-gtsp`. One item is one trial, so the reports
+//! compare as trials a second whatever the budget; both methods get the same number of trials.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

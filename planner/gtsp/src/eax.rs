@@ -9,7 +9,7 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::local::LocalSearch;
-use crate::order::Order;
+use crate::search_tour::SearchTour;
 use crate::table::Table;
 
 const NONE: u32 = u32::MAX;
@@ -35,7 +35,7 @@ pub(super) struct Crossover {
     touched: Vec<u32>,
 }
 
-fn links(tour: &Order, into: &mut Links) {
+fn links(tour: &SearchTour, into: &mut Links) {
     let m = tour.order.len();
     into.clear();
     into.resize(m, [NONE; 2]);
@@ -58,8 +58,8 @@ impl Crossover {
     pub(super) fn prepare(
         &mut self,
         table: &Table,
-        a: &Order,
-        b: &Order,
+        a: &SearchTour,
+        b: &SearchTour,
         rng: &mut ChaCha8Rng,
     ) -> usize {
         links(a, &mut self.a);
@@ -162,16 +162,15 @@ impl Crossover {
         }
     }
 
-    /// Applies cycle `k` to the first parent, whose nodes are `chosen`, patches, chooses nodes and
-    /// improves locally.
+    /// Applies cycle `k` to the first of the two parents that were prepared, patches, chooses nodes
+    /// and improves locally.
     pub(super) fn child(
         &mut self,
         table: &Table,
-        b: &Order,
+        [a, b]: [&SearchTour; 2],
         k: usize,
-        chosen: &[u32],
         local: &mut LocalSearch,
-        out: &mut Order,
+        out: &mut SearchTour,
     ) {
         let from = if k == 0 { 0 } else { self.ends[k - 1] };
         let cycle = &self.cycle[from..self.ends[k]];
@@ -196,7 +195,7 @@ impl Crossover {
                 self.child[tail as usize][1] = head;
             }
         }
-        out.chosen.copy_from_slice(chosen);
+        out.chosen.copy_from_slice(&a.chosen);
         for c in &self.touched {
             let c = *c as usize;
             let (mine, other) = (self.child[c], self.b[c]);
@@ -251,11 +250,11 @@ impl Crossover {
                     }
                     if all {
                         for n in 0..m as u32 {
-                            self.try_patch(table, &d, id, x, n, &mut best);
+                            self.try_patch(table, &d, x, n, &mut best);
                         }
                     } else {
                         for (n, _) in table.near_out(x) {
-                            self.try_patch(table, &d, id, x, n, &mut best);
+                            self.try_patch(table, &d, x, n, &mut best);
                         }
                     }
                 }
@@ -279,16 +278,16 @@ impl Crossover {
         }
     }
 
+    /// Cheapest exchange of an arc at `x` and one at `u`, where they belong to different subtours.
     fn try_patch(
         &self,
         table: &Table,
         d: &impl Fn(u32, u32) -> i64,
-        id: u32,
         x: u32,
         u: u32,
         best: &mut (i64, [u32; 4]),
     ) {
-        if self.part[u as usize] == id {
+        if self.part[u as usize] == self.part[x as usize] {
             return;
         }
         if table.reversible {
@@ -310,7 +309,7 @@ impl Crossover {
     }
 
     /// The order from the root on, in the cheaper direction.
-    fn unroll(&self, table: &Table, out: &mut Order) {
+    fn unroll(&self, table: &Table, out: &mut SearchTour) {
         let root = table.root as u32;
         let [x, y] = self.child[root as usize];
         let d = |x: u32, y: u32| table.d(x, out.chosen[x as usize], y, out.chosen[y as usize]);

@@ -25,7 +25,7 @@ pub enum Costs {
     /// Blocks of adjacent cluster pairs only; every other pair is a jump. Give both directions of
     /// a symmetric pair (see [`Block::both_ways`]).
     Blocks(Vec<Block>),
-    /// Costs computed when asked for, for example from joint vectors.
+    /// Costs computed when asked for, for example from coordinates.
     OnDemand(OnDemand),
 }
 

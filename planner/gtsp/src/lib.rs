@@ -25,23 +25,24 @@
 
 mod atsp;
 mod bound;
+mod candidate_nodes;
 mod closed;
+mod cluster_optimisation;
 mod eax;
 mod exact;
+mod ils;
 mod instance;
-mod joint;
-mod layered;
 mod local;
-mod order;
-mod pool;
-mod raw;
+mod moves;
+mod population;
+mod reconnection;
 mod record;
-mod search;
+mod rooted;
+mod search_tour;
 mod solve;
 mod table;
 #[cfg(test)]
 mod tests;
-mod thin;
 mod tour;
 mod transform;
 pub mod tsplib;

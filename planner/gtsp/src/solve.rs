@@ -7,15 +7,15 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::bound::lower_bound;
+use crate::candidate_nodes::{CandidateNodes, polish};
 use crate::exact;
+use crate::ils::{Cooling, construct, descend, iterate};
 use crate::instance::Instance;
 use crate::local::LocalSearch;
-use crate::order::Order;
-use crate::pool::{Epoch, Streams, evolve};
+use crate::population::{Epoch, Streams, evolve};
 use crate::record::{Observer, Progress, Record};
-use crate::search::{Cooling, construct, iterate, settle};
+use crate::search_tour::SearchTour;
 use crate::table::Table;
-use crate::thin::{Thinned, polish};
 use crate::tour::{Tour, TourCost};
 
 /// Limits on the work.
@@ -77,6 +77,16 @@ pub enum SolveError {
     /// Neither trials nor time limit the search.
     #[error("the budget has no limit: set trials, time or both")]
     NoLimit,
+    /// The search keeps its costs in one list that 32 bits count.
+    #[error(
+        "{nodes} nodes in {clusters} clusters are too many: the search counts costs in 32 bits"
+    )]
+    TooLarge {
+        /// Clusters of the instance.
+        clusters: usize,
+        /// Nodes of the instance.
+        nodes: usize,
+    },
     /// The thread pool could not be made.
     #[error("could not start {threads} threads")]
     Threads {
@@ -137,19 +147,21 @@ pub fn solve_with(
         .num_threads(budget.threads)
         .build()
         .map_err(|_| SolveError::Threads { threads: budget.threads })?;
-    Ok(pool.install(|| rounds(instance, budget, seed, control, started)))
+    let full = Table::new(instance)
+        .ok_or(SolveError::TooLarge { clusters: instance.clusters(), nodes: instance.nodes() })?;
+    Ok(pool.install(|| run_epochs(instance, &full, budget, seed, control, started)))
 }
 
 /// The search without the exact method; at least one tour is always made.
-pub(super) fn rounds(
+pub(super) fn run_epochs(
     instance: &Instance,
+    full: &Table,
     budget: &Budget,
     seed: u64,
     control: Control<'_>,
     started: Instant,
 ) -> Solution {
-    let full = Table::new(instance);
-    let mut thinned = Thinned::new(&full);
+    let mut candidates = CandidateNodes::select(full);
     let stopped = AtomicBool::new(false);
     let cancel = control.cancel;
     let stop = || {
@@ -160,9 +172,9 @@ pub(super) fn rounds(
     let mut record = Record::new(instance, budget.target, control.progress, started, &stopped);
     let mut streams = Streams::new(seed);
     let limit = budget.trials.unwrap_or(u64::MAX);
-    let mut elite: Vec<Order> = Vec::new();
+    let mut elite: Vec<SearchTour> = Vec::new();
     if let Some(start) = control.start.filter(|start| start.check(instance).is_ok()) {
-        elite.push(Order::from_tour(&full, start));
+        elite.push(SearchTour::from_tour(full, start));
         record.offer(start.clone());
     }
     for number in 0.. {
@@ -175,19 +187,19 @@ pub(super) fn rounds(
             Epoch { number, limit: left, likely }
         };
         // Every other epoch has all nodes.
-        if let Some(thinned) = thinned.as_mut().filter(|_| number % 2 == 0) {
-            elite.iter().for_each(|tour| thinned.take_up(tour));
-            let table = thinned.table(&full);
-            let mut inside: Vec<Order> =
-                elite.iter().map(|tour| thinned.inside(&table, tour)).collect();
-            evolve(&table, epoch(&table), &mut inside, &mut streams, &stop, &mut record);
+        if let Some(candidates) = candidates.as_mut().filter(|_| number % 2 == 0) {
+            elite.iter().for_each(|tour| candidates.add_chosen(tour));
+            let table = candidates.table(full);
+            let mut reduced: Vec<SearchTour> =
+                elite.iter().map(|tour| candidates.reduce(&table, tour)).collect();
+            evolve(&table, epoch(&table), &mut reduced, &mut streams, &stop, &mut record);
             if !stopped.load(Ordering::Relaxed) {
-                elite.extend(inside.last().map(|winner| polish(&full, &winner.to_tour(&table))));
-                let best = record.best().map(|tour| polish(&full, tour).to_tour(&full));
+                elite.extend(reduced.last().map(|winner| polish(full, &winner.to_tour(&table))));
+                let best = record.best().map(|tour| polish(full, tour).to_tour(full));
                 best.into_iter().for_each(|best| record.offer(best));
             }
         } else {
-            evolve(&full, epoch(&full), &mut elite, &mut streams, &stop, &mut record);
+            evolve(full, epoch(full), &mut elite, &mut streams, &stop, &mut record);
         }
         // So few clusters are enumerated: one epoch has the optimum.
         if record.made >= limit || stop() || full.is_small() {
@@ -206,7 +218,7 @@ fn trials_a_second(table: &Table, seed: u64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut local = LocalSearch::new(table.m);
     let mut tour = construct(table, &mut rng);
-    settle(table, &mut local, &mut tour);
+    descend(table, &mut local, &mut tour);
     let cooling = Cooling { trials: TRIALS, from: 0.3, to: 0.03 };
     let started = Instant::now();
     iterate(table, &mut local, &mut tour, cooling, &mut rng, &|| false);

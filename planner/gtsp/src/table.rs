@@ -6,7 +6,7 @@
 //! is always taken from the instance.
 
 use crate::instance::{Ends, Instance, Jump};
-use crate::raw::{Raw, statistics};
+use crate::rooted::Rooted;
 
 /// Jump price in the search, in units of the largest arc worth having.
 const JUMP_FACTOR: f64 = 4.0;
@@ -14,6 +14,8 @@ const JUMP_FACTOR: f64 = 4.0;
 const NEAR: usize = 10;
 /// Instances of fewer clusters, the root's included, are enumerated.
 const SMALL: usize = 9;
+/// Costs of at most this much count as zero.
+const TINY: f64 = 1e-200;
 /// Costs that are handled side by side; blocks may be read this far past their end.
 pub(super) const LANES: usize = 8;
 
@@ -46,9 +48,6 @@ pub(super) struct Table {
     names: Option<Vec<Vec<u32>>>,
 }
 
-/// Costs of at most this much count as zero.
-const TINY: f64 = 1e-200;
-
 /// Where a block lies; absent blocks share one of zeros and add their price.
 #[derive(Clone, Copy)]
 struct Pair {
@@ -57,100 +56,20 @@ struct Pair {
 }
 
 impl Table {
-    pub(super) fn new(instance: &Instance) -> Self {
-        let clusters = instance.clusters();
-        let (root, m) = match *instance.ends() {
-            Ends::OpenFromCosts(_) => (clusters, clusters + 1),
-            Ends::OpenFromCluster(start) => (start, clusters),
-            Ends::Closed => {
-                ((0..clusters).min_by_key(|&c| instance.sizes()[c]).unwrap_or(0), clusters)
-            }
-        };
-        let mut raw = Raw { instance, m, root, disguised: None, kept: None };
-        raw.keep_what_fits();
-        let statistics = statistics(&raw);
-        raw.disguised = statistics.disguised;
-
-        // Without any arc, or with free ones only, jumps alone set the scale.
-        let cap = if statistics.largest > TINY { statistics.largest } else { 1.0 };
-        // Prices of a table differ among themselves, which must not be lost.
-        let dearest = match instance.jump() {
-            Jump::Table(table) => table.iter().copied().fold(0.0, f64::max),
-            _ => 0.0,
-        };
-        let ceiling = dearest.max(JUMP_FACTOR * cap);
-        let room = f64::from(1 << 30) / (m + 2) as f64;
-        let whole_prices = match (statistics.disguised, instance.jump()) {
-            (Some(_), _) | (None, Jump::Forbidden) => true,
-            (None, Jump::Uniform(h)) => h.fract() == 0.0,
-            (None, Jump::Table(table)) => table.iter().all(|h| h.fract() == 0.0),
-        };
-        let scale = if statistics.integers && whole_prices && ceiling <= room {
-            1.0
-        } else {
-            room / ceiling
-        };
-        let quantise = |c: f64| (c.clamp(-ceiling, ceiling) * scale).round() as i32;
-
-        let sizes: Vec<u32> = (0..m).map(|a| raw.size(a) as u32).collect();
+    /// The costs of an instance; `None` where they are too many to be told apart by 32 bits.
+    pub(super) fn new(instance: &Instance) -> Option<Self> {
+        let rooted = Rooted::new(instance);
+        let (root, m) = (rooted.root, rooted.m);
+        let sizes: Vec<u32> = (0..m).map(|a| rooted.size(a) as u32).collect();
         let widest = sizes.iter().copied().max().unwrap_or(1) as usize;
-        let mut data = vec![0; widest * widest];
-        let mut pairs = vec![Pair { at: 0, add: 0 }; m * m];
-        let mut lowest = vec![i32::MAX; m * m];
-        let mut row = Vec::new();
-        for (a, b) in raw.pairs() {
-            let price = raw.price(a, b);
-            let search_price = quantise(price);
-            row.clear();
-            let mut present = false;
-            if raw.maybe_adjacent(a, b) {
-                for entry in raw.entries(a, b) {
-                    present |= entry.is_some();
-                    row.push(entry.map_or(search_price, quantise));
-                }
-            }
-            if present {
-                pairs[a * m + b] = Pair { at: data.len() as u32, add: 0 };
-                lowest[a * m + b] = row.iter().copied().min().unwrap_or(i32::MAX);
-                data.extend_from_slice(&row);
-            } else {
-                pairs[a * m + b] = Pair { at: 0, add: search_price };
-                lowest[a * m + b] = search_price;
-            }
-        }
-        let reversible = raw.pairs().all(|(a, b)| {
-            a < b || a == root || b == root || {
-                let (p, q) = (pairs[a * m + b], pairs[b * m + a]);
-                let (x, y) = (sizes[a] as usize, sizes[b] as usize);
-                p.add == q.add
-                    && (0..x).all(|i| {
-                        (0..y).all(|j| {
-                            data[p.at as usize + i * y + j] == data[q.at as usize + j * x + i]
-                        })
-                    })
-            }
-        });
-        let mut transposed = vec![0; m * m];
-        for (a, b) in raw.pairs() {
-            let p = pairs[a * m + b];
-            if p.at == 0 {
-                continue;
-            }
-            let back = pairs[b * m + a];
-            transposed[a * m + b] = if reversible && a != root && b != root {
-                back.at
-            } else {
-                let (x, y) = (sizes[a] as usize, sizes[b] as usize);
-                let start = data.len();
-                for j in 0..y {
-                    for i in 0..x {
-                        let value = data[p.at as usize + i * y + j];
-                        data.push(value);
-                    }
-                }
-                start as u32
-            };
-        }
+        // By rows and by columns, and the shared block of zeros.
+        let room = 2 * rooted.stored_entries() + widest * widest + LANES;
+        u32::try_from(room).ok()?;
+
+        let mut blocks = Blocks::of(&rooted, widest);
+        let reversible = blocks.reversible(&rooted);
+        let transposed = blocks.transpose(&rooted, reversible);
+        let Blocks { pairs, mut data, lowest } = blocks;
         data.extend_from_slice(&[0; LANES]);
         let mut table = Self {
             m,
@@ -169,13 +88,13 @@ impl Table {
             near_cost: Vec::new(),
             near_in_cost: Vec::new(),
             near_start: Vec::new(),
-            outer_root: root >= clusters,
+            outer_root: root >= instance.clusters(),
             open: *instance.ends() != Ends::Closed,
             names: None,
         };
         table.find_row_lowest();
         table.find_candidates();
-        table
+        Some(table)
     }
 
     /// The same costs between fewer nodes: `nodes` of each cluster, ascending.
@@ -397,4 +316,110 @@ impl Table {
     pub(super) fn instance_node(&self, c: u32, i: u32) -> u32 {
         self.names.as_ref().map_or(i, |names| names[c as usize][i as usize])
     }
+}
+
+/// The blocks of all cluster pairs, row by row, before they are transposed.
+struct Blocks {
+    pairs: Vec<Pair>,
+    data: Vec<i32>,
+    lowest: Vec<i32>,
+}
+
+impl Blocks {
+    fn of(rooted: &Rooted<'_>, widest: usize) -> Self {
+        let m = rooted.m;
+        let quantise = quantiser(rooted);
+        let mut data = vec![0; widest * widest];
+        let mut pairs = vec![Pair { at: 0, add: 0 }; m * m];
+        let mut lowest = vec![i32::MAX; m * m];
+        let mut row = Vec::new();
+        for (a, b) in rooted.pairs() {
+            let search_price = quantise(rooted.price(a, b));
+            row.clear();
+            let mut present = false;
+            if rooted.maybe_adjacent(a, b) {
+                for entry in rooted.entries(a, b) {
+                    present |= entry.is_some();
+                    row.push(entry.map_or(search_price, &quantise));
+                }
+            }
+            if present {
+                pairs[a * m + b] = Pair { at: data.len() as u32, add: 0 };
+                lowest[a * m + b] = row.iter().copied().min().unwrap_or(i32::MAX);
+                data.extend_from_slice(&row);
+            } else {
+                pairs[a * m + b] = Pair { at: 0, add: search_price };
+                lowest[a * m + b] = search_price;
+            }
+        }
+        Self { pairs, data, lowest }
+    }
+
+    /// Whether the costs between all clusters but the root are symmetric.
+    fn reversible(&self, rooted: &Rooted<'_>) -> bool {
+        let (m, root) = (rooted.m, rooted.root);
+        rooted.pairs().all(|(a, b)| {
+            a < b || a == root || b == root || {
+                let (p, q) = (self.pairs[a * m + b], self.pairs[b * m + a]);
+                let (x, y) = (rooted.size(a), rooted.size(b));
+                p.add == q.add
+                    && (0..x).all(|i| {
+                        (0..y).all(|j| {
+                            self.data[p.at as usize + i * y + j]
+                                == self.data[q.at as usize + j * x + i]
+                        })
+                    })
+            }
+        })
+    }
+
+    /// Where each block lies column by column: the opposite block where that is the same.
+    fn transpose(&mut self, rooted: &Rooted<'_>, reversible: bool) -> Vec<u32> {
+        let (m, root) = (rooted.m, rooted.root);
+        let mut transposed = vec![0; m * m];
+        for (a, b) in rooted.pairs() {
+            let p = self.pairs[a * m + b];
+            if p.at == 0 {
+                continue;
+            }
+            let back = self.pairs[b * m + a];
+            transposed[a * m + b] = if reversible && a != root && b != root {
+                back.at
+            } else {
+                let (x, y) = (rooted.size(a), rooted.size(b));
+                let start = self.data.len();
+                for j in 0..y {
+                    for i in 0..x {
+                        let value = self.data[p.at as usize + i * y + j];
+                        self.data.push(value);
+                    }
+                }
+                start as u32
+            };
+        }
+        transposed
+    }
+}
+
+/// Costs to integers, so that the sum of a whole tour fits 32 bits; the identity where the costs are
+/// small integers.
+fn quantiser(rooted: &Rooted<'_>) -> impl Fn(f64) -> i32 {
+    let (statistics, jump) = (&rooted.statistics, rooted.instance.jump());
+    // Without any arc, or with free ones only, jumps alone set the scale.
+    let cap = if statistics.largest > TINY { statistics.largest } else { 1.0 };
+    // Prices of a table differ among themselves, which must not be lost.
+    let highest_price = match jump {
+        Jump::Table(table) => table.iter().copied().fold(0.0, f64::max),
+        _ => 0.0,
+    };
+    let ceiling = highest_price.max(JUMP_FACTOR * cap);
+    let room = f64::from(1 << 30) / (rooted.m + 2) as f64;
+    let whole_prices = match (statistics.big_m, jump) {
+        (Some(_), _) | (None, Jump::Forbidden) => true,
+        (None, Jump::Uniform(h)) => h.fract() == 0.0,
+        (None, Jump::Table(table)) => table.iter().all(|h| h.fract() == 0.0),
+    };
+    let exact = statistics.integers && whole_prices && ceiling <= room;
+    let scale = if exact { 1.0 } else { room / ceiling };
+    move |c| (c.clamp(-ceiling, ceiling) * scale).round() as i32
 }

@@ -6,7 +6,8 @@ use proptest::prelude::*;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::solve::rounds;
+use crate::solve::run_epochs;
+use crate::table::Table;
 use crate::{
     Block, Budget, Control, Costs, Ends, Instance, Jump, OnDemand, Solution, Tour, TourError,
     lower_bound, solve, solve_exact, solve_with, tsplib,
@@ -93,7 +94,8 @@ fn scattered(clusters: usize, spread: f64, seed: u64) -> Instance {
 fn search(instance: &Instance, trials: u64, threads: usize) -> Solution {
     let budget = Budget { threads, ..Budget::trials(trials) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
-    pool.install(|| rounds(instance, &budget, 5, Control::default(), Instant::now()))
+    let full = Table::new(instance).expect("small enough");
+    pool.install(|| run_epochs(instance, &full, &budget, 5, Control::default(), Instant::now()))
 }
 
 proptest! {

@@ -1,4 +1,4 @@
-//! The paper's road: the instance as an asymmetric TSP, solved by a Lin–Kernighan-style search.
+//! The transformation into an asymmetric TSP, which a Lin–Kernighan-style search then solves.
 //!
 //! Behzad & Modarres, "A new efficient transformation of the generalized traveling salesman problem
 //! into traveling salesman problem", 2002: inside a cluster v₁ … vᵣ the arcs vⱼ → vⱼ₊₁ (cyclic) cost

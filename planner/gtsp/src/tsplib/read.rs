@@ -389,7 +389,7 @@ fn number(word: &[u8], line: usize) -> Result<f64, TsplibError> {
     }
 }
 
-/// The fast road for what nearly all files consist of.
+/// The fast path for what nearly all files consist of.
 fn small_integer(word: &[u8]) -> Option<i32> {
     let (negative, digits) = match word {
         [b'-', digits @ ..] => (true, digits),

@@ -1,4 +1,4 @@
-//! Every weight type and format, malformed files by line, and the way out and back.
+//! Every weight type and format, malformed files by line, and instances written and read again.
 
 use proptest::prelude::*;
 

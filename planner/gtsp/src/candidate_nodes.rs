@@ -1,32 +1,31 @@
-//! Wide clusters thinned to the nodes that matter.
+//! Candidate nodes of wide clusters.
 //!
 //! Of a hundred nodes of a cluster a good tour can use few: those at the ends of cheap arcs to the
-//! clusters nearby, and those on cheap ways through the cluster. The search runs on these; each
-//! tour that it ends with is polished with all nodes, and the nodes that this brings in are taken
-//! up, so that nothing is lost for good.
+//! clusters nearby, and those on cheap paths through the cluster. Every other epoch searches these
+//! alone. The tour that it ends with is polished with all nodes, and the nodes that this brings in
+//! become candidates, so that no node is excluded for good.
 
+use crate::ils::descend;
 use crate::local::LocalSearch;
-use crate::order::Order;
-use crate::search::settle;
+use crate::search_tour::SearchTour;
 use crate::table::Table;
 use crate::tour::Tour;
 
-/// Clusters of more nodes are thinned.
+/// All nodes of clusters up to this size are candidates.
 const WIDE: u32 = 24;
 /// Cheapest arcs between two near clusters whose ends are kept.
 const ARCS: usize = 3;
-/// Neighbours of a cluster between which the cheapest way through it is kept.
-const WAYS: usize = 10;
+/// Neighbours of a cluster between which the cheapest path through it is kept.
+const PATHS: usize = 10;
 
-/// The nodes in use of each cluster, ascending.
-#[derive(Clone)]
-pub(super) struct Thinned {
+/// The candidates of each cluster, ascending.
+pub(super) struct CandidateNodes {
     nodes: Vec<Vec<u32>>,
 }
 
-impl Thinned {
-    /// The nodes that matter; `None` where no cluster is wide, or all tours are enumerated.
-    pub(super) fn new(full: &Table) -> Option<Self> {
+impl CandidateNodes {
+    /// The candidates by the costs; `None` where no cluster is wide, or all tours are enumerated.
+    pub(super) fn select(full: &Table) -> Option<Self> {
         if full.is_small() || full.sizes.iter().all(|&size| size <= WIDE) {
             return None;
         }
@@ -38,9 +37,9 @@ impl Thinned {
                 keep_cheap_arcs(full, a, b, &mut kept);
                 keep_cheap_arcs(full, b, a, &mut kept);
             }
-            for &b in near.iter().take(WAYS) {
-                for &c in near.iter().take(WAYS).filter(|&&c| c != b) {
-                    keep_way_through(full, b, a, c, &mut kept);
+            for &b in near.iter().take(PATHS) {
+                for &c in near.iter().take(PATHS).filter(|&&c| c != b) {
+                    keep_path_through(full, b, a, c, &mut kept);
                 }
             }
         }
@@ -55,13 +54,13 @@ impl Thinned {
         Some(Self { nodes })
     }
 
-    /// The costs between the nodes in use.
+    /// The costs between the candidates.
     pub(super) fn table(&self, full: &Table) -> Table {
         full.restricted(&self.nodes)
     }
 
-    /// Takes up the nodes of a polished tour.
-    pub(super) fn take_up(&mut self, polished: &Order) {
+    /// Makes the nodes of a polished tour candidates.
+    pub(super) fn add_chosen(&mut self, polished: &SearchTour) {
         for (nodes, &chosen) in self.nodes.iter_mut().zip(&polished.chosen) {
             if let Err(at) = nodes.binary_search(&chosen) {
                 nodes.insert(at, chosen);
@@ -69,19 +68,19 @@ impl Thinned {
         }
     }
 
-    /// The polished tour in the thinned table's terms; its nodes were taken up.
-    pub(super) fn inside(&self, table: &Table, polished: &Order) -> Order {
+    /// The polished tour in the terms of the candidates' table; its nodes are among them.
+    pub(super) fn reduce(&self, table: &Table, polished: &SearchTour) -> SearchTour {
         let place =
             |(c, node): (usize, &u32)| self.nodes[c].binary_search(node).unwrap_or(0) as u32;
         let chosen = polished.chosen.iter().enumerate().map(place).collect();
-        Order::new(table, polished.order.clone(), chosen)
+        SearchTour::new(table, polished.order.clone(), chosen)
     }
 }
 
 /// The tour with all nodes to choose from, brought to a local optimum.
-pub(super) fn polish(full: &Table, tour: &Tour) -> Order {
-    let mut polished = Order::from_tour(full, tour);
-    settle(full, &mut LocalSearch::new(full.m), &mut polished);
+pub(super) fn polish(full: &Table, tour: &Tour) -> SearchTour {
+    let mut polished = SearchTour::from_tour(full, tour);
+    descend(full, &mut LocalSearch::new(full.m), &mut polished);
     polished
 }
 
@@ -100,14 +99,14 @@ fn keep_cheap_arcs(full: &Table, a: u32, b: u32, kept: &mut [Vec<bool>]) {
     }
 }
 
-/// Keeps the nodes of the cheapest way from `b` through `a` to `c`.
-fn keep_way_through(full: &Table, b: u32, a: u32, c: u32, kept: &mut [Vec<bool>]) {
+/// Keeps the nodes of the cheapest path from `b` through `a` to `c`.
+fn keep_path_through(full: &Table, b: u32, a: u32, c: u32, kept: &mut [Vec<bool>]) {
     if !full.is_stored(b, a) || !full.is_stored(a, c) {
         return;
     }
     let out = full.row_lowest(a, c);
-    let ways: Vec<i32> = full.column_lowest(b, a).iter().zip(out).map(|(x, y)| x + y).collect();
-    let i = cheapest(&ways);
+    let paths: Vec<i32> = full.column_lowest(b, a).iter().zip(out).map(|(x, y)| x + y).collect();
+    let i = cheapest(&paths);
     kept[a as usize][i] = true;
     kept[b as usize][cheapest(full.column(b, a, i as u32).1)] = true;
     kept[c as usize][cheapest(full.row(a, i as u32, c).1)] = true;

@@ -1,11 +1,11 @@
-//! Cheapest nodes at a new joint, its neighbours' nodes being given.
+//! Cheapest nodes at the ends of a new arc, the nodes of the clusters around it being given.
 
-use crate::layered::lowest;
+use crate::cluster_optimisation::lowest;
 use crate::table::{LANES, Table};
 
-/// Joint p → a → b → q whose middle nodes are free.
+/// A new arc a → b between given nodes p and q: p → a → b → q, where the nodes of a and b are free.
 #[derive(Clone, Copy)]
-pub(super) struct Joint<'a> {
+pub(super) struct Reconnection<'a> {
     into: &'a [i32],
     /// Cheapest entry of each of the block's rows.
     lows: &'a [i32],
@@ -13,13 +13,13 @@ pub(super) struct Joint<'a> {
     out: &'a [i32],
     /// What the rows leave out.
     add: i64,
-    /// Cheapest way out.
+    /// Cheapest entry of `out`.
     least_out: i32,
     /// No choice of nodes costs less.
     pub(super) bound: i64,
 }
 
-impl<'a> Joint<'a> {
+impl<'a> Reconnection<'a> {
     #[inline]
     pub(super) fn new(table: &'a Table, p: (u32, u32), a: u32, b: u32, q: (u32, u32)) -> Self {
         let (add_in, into) = table.row(p.0, p.1, a);
@@ -28,8 +28,8 @@ impl<'a> Joint<'a> {
         let lows = table.row_lowest(a, b);
         let least_out = smallest(out);
         let add = i64::from(add_in) + i64::from(add) + i64::from(add_out);
-        let ways = into.iter().zip(lows).map(|(d, low)| d + low);
-        let bound = add + i64::from(ways.min().unwrap_or(0) + least_out);
+        let paths = into.iter().zip(lows).map(|(d, low)| d + low);
+        let bound = add + i64::from(paths.min().unwrap_or(0) + least_out);
         Self { into, lows, block, out, add, least_out, bound }
     }
 
@@ -46,17 +46,17 @@ impl<'a> Joint<'a> {
         let mut best = i32::MAX;
         let mut start = 0;
         while start < width {
-            let mut ways = [i32::MAX; LANES];
+            let mut paths = [i32::MAX; LANES];
             for (i, (&d, &low)) in self.into.iter().zip(self.lows).enumerate() {
                 if d + low < allowed {
                     let at = i * width + start;
-                    for (w, x) in ways.iter_mut().zip(&self.block[at..at + LANES]) {
-                        *w = (*w).min(d + x);
+                    for (path, x) in paths.iter_mut().zip(&self.block[at..at + LANES]) {
+                        *path = (*path).min(d + x);
                     }
                 }
             }
-            for (w, x) in ways.iter().zip(&self.out[start..]) {
-                best = best.min(w.saturating_add(*x));
+            for (path, x) in paths.iter().zip(&self.out[start..]) {
+                best = best.min(path.saturating_add(*x));
             }
             start += LANES;
         }
@@ -84,7 +84,7 @@ fn smallest(row: &[i32]) -> i32 {
 
 /// Cheapest p → a → q over the nodes of a.
 #[inline]
-pub(super) fn between(table: &Table, p: (u32, u32), a: u32, q: (u32, u32)) -> (i64, u32) {
+pub(super) fn cheapest_between(table: &Table, p: (u32, u32), a: u32, q: (u32, u32)) -> (i64, u32) {
     let (add_in, into) = table.row(p.0, p.1, a);
     let (add_out, out) = table.column(a, q.0, q.1);
     let (value, node) = lowest(into, out);

@@ -5,7 +5,7 @@ use crate::tour::Tour;
 
 /// Order of the clusters with the root first, chosen nodes, and the cost in the table's units.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct Order {
+pub(super) struct SearchTour {
     pub(super) order: Vec<u32>,
     pub(super) position: Vec<u32>,
     pub(super) chosen: Vec<u32>,
@@ -16,7 +16,7 @@ pub(super) struct Order {
     pub(super) cost: i64,
 }
 
-impl Order {
+impl SearchTour {
     pub(super) fn new(table: &Table, order: Vec<u32>, chosen: Vec<u32>) -> Self {
         let mut position = vec![0; order.len()];
         for (p, &c) in order.iter().enumerate() {
@@ -94,7 +94,7 @@ impl Order {
 
     /// What another choice of nodes could save of that arc at most.
     #[inline]
-    pub(super) fn loose(&self, p: usize) -> i64 {
+    pub(super) fn slack(&self, p: usize) -> i64 {
         i64::from(self.slack[if p >= self.slack.len() { p - self.slack.len() } else { p }])
     }
 
@@ -120,8 +120,8 @@ impl Order {
         self.arcs[from..to].iter().map(|&d| i64::from(d)).sum()
     }
 
-    /// Reverses a stretch. The arcs inside it follow where costs are symmetric; the joints and
-    /// everything else are for the caller to refresh.
+    /// Reverses a stretch. The arcs inside it follow where costs are symmetric; the arcs at its
+    /// ends and everything else are for the caller to refresh.
     pub(super) fn reverse(&mut self, first: usize, last: usize) {
         self.order[first..=last].reverse();
         self.arcs[first..last].reverse();
@@ -129,8 +129,8 @@ impl Order {
         self.renumber(first, last);
     }
 
-    /// Exchanges the stretches `first..middle` and `middle..=last`; the three joints are for the
-    /// caller to refresh.
+    /// Exchanges the stretches `first..middle` and `middle..=last`; the three new arcs are for
+    /// the caller to refresh.
     pub(super) fn exchange(&mut self, first: usize, middle: usize, last: usize) {
         self.order[first..=last].rotate_left(middle - first);
         self.arcs[first..=last].rotate_left(middle - first);

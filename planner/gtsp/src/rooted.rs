@@ -1,30 +1,59 @@
-//! The instance as the search sees it: with a root, disguised jumps told apart, and only as many
-//! blocks as there is room for.
+//! The instance as the search sees it: with a root cluster, large entries that mean "no arc" taken
+//! for jumps, and only as many cost blocks as there is room for.
 
 use crate::instance::{Ends, Instance, Jump};
 
-/// An entry that is the largest of all and at least this common is "no arc" in disguise.
-const DISGUISED_JUMPS: f64 = 0.3;
+/// Where the largest entry makes up at least this share of all, it stands for "no arc".
+const BIG_M_SHARE: f64 = 0.3;
 /// Entries of cost blocks that the search keeps, 4 bytes each.
 const ROOM: usize = 1 << 28;
 /// Neighbours of each cluster whose blocks are kept where all would not fit.
 const KEPT: usize = 24;
 
 /// The instance with its root.
-pub(super) struct Raw<'a> {
+pub(super) struct Rooted<'a> {
     pub(super) instance: &'a Instance,
+    /// Number of clusters, the fixed start's included.
     pub(super) m: usize,
+    /// The start of an open path, else the smallest cluster.
     pub(super) root: usize,
-    pub(super) disguised: Option<f64>,
+    pub(super) statistics: Statistics,
     /// Pairs that are kept where not all of them fit; the search sees the others as jumps.
-    pub(super) kept: Option<Vec<bool>>,
+    kept: Option<Vec<bool>>,
 }
 
-impl Raw<'_> {
+/// What all costs together say.
+#[derive(Default)]
+pub(super) struct Statistics {
+    /// The scale of the arcs: the largest magnitude, or the largest cost below `big_m`.
+    pub(super) largest: f64,
+    pub(super) integers: bool,
+    /// The entry that stands for "no arc", if one does.
+    pub(super) big_m: Option<f64>,
+}
+
+impl<'a> Rooted<'a> {
+    pub(super) fn new(instance: &'a Instance) -> Self {
+        let clusters = instance.clusters();
+        let (root, m) = match *instance.ends() {
+            Ends::OpenFromCosts(_) => (clusters, clusters + 1),
+            Ends::OpenFromCluster(start) => (start, clusters),
+            Ends::Closed => {
+                ((0..clusters).min_by_key(|&c| instance.sizes()[c]).unwrap_or(0), clusters)
+            }
+        };
+        let mut rooted = Self { instance, m, root, statistics: Statistics::default(), kept: None };
+        rooted.keep_what_fits();
+        rooted.statistics = statistics(&rooted);
+        rooted
+    }
+
+    /// Number of nodes; the fixed start has one.
     pub(super) fn size(&self, a: usize) -> usize {
         self.instance.sizes().get(a).copied().unwrap_or(1)
     }
 
+    /// Whether the search sees some arc from `a` to `b`.
     pub(super) fn maybe_adjacent(&self, a: usize, b: usize) -> bool {
         if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
             return false;
@@ -35,10 +64,12 @@ impl Raw<'_> {
             || self.enters_root(b)
     }
 
+    /// Whether an arc to `b` only closes an open path.
     pub(super) fn enters_root(&self, b: usize) -> bool {
         b == self.root && *self.instance.ends() != Ends::Closed
     }
 
+    /// Cost of an arc; `None` where only a jump leads there.
     pub(super) fn arc(&self, a: usize, i: usize, b: usize, j: usize) -> Option<f64> {
         if self.enters_root(b) {
             return Some(0.0); // the closing arc of an open path
@@ -49,14 +80,15 @@ impl Raw<'_> {
             }
             _ => self.instance.arc(a, i, b, j),
         };
-        arc.filter(|c| Some(*c) != self.disguised)
+        arc.filter(|c| Some(*c) != self.statistics.big_m)
     }
 
+    /// Price of a jump.
     pub(super) fn price(&self, a: usize, b: usize) -> f64 {
         if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
-            return f64::INFINITY; // seen as the dearest of all
+            return f64::INFINITY; // the search caps it at its highest price
         }
-        if let Some(price) = self.disguised {
+        if let Some(price) = self.statistics.big_m {
             return price;
         }
         if self.enters_root(b) {
@@ -70,14 +102,9 @@ impl Raw<'_> {
 
     /// Where the blocks would need too much room, keeps those to and from the nearest clusters, by
     /// a few of their nodes.
-    pub(super) fn keep_what_fits(&mut self) {
-        let entries: usize = self
-            .pairs()
-            .filter(|&(a, b)| self.maybe_adjacent(a, b))
-            .map(|(a, b)| self.size(a) * self.size(b))
-            .sum();
-        // Asymmetric costs are stored both ways.
-        if 2 * entries <= ROOM {
+    fn keep_what_fits(&mut self) {
+        // Asymmetric costs are stored by rows and by columns.
+        if 2 * self.stored_entries() <= ROOM {
             return;
         }
         let few = |c: usize| (0..self.size(c)).step_by(self.size(c).div_ceil(4));
@@ -107,10 +134,20 @@ impl Raw<'_> {
         self.kept = Some(kept);
     }
 
+    /// Entries of the blocks that the search sees.
+    pub(super) fn stored_entries(&self) -> usize {
+        self.pairs()
+            .filter(|&(a, b)| self.maybe_adjacent(a, b))
+            .map(|(a, b)| self.size(a) * self.size(b))
+            .sum()
+    }
+
+    /// All ordered pairs of different clusters.
     pub(super) fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.m).flat_map(move |a| (0..self.m).map(move |b| (a, b))).filter(|(a, b)| a != b)
     }
 
+    /// Costs from every node of `a` to every node of `b`, row by row.
     pub(super) fn entries(&self, a: usize, b: usize) -> impl Iterator<Item = Option<f64>> + '_ {
         let adjacent = self.maybe_adjacent(a, b);
         (0..self.size(a))
@@ -119,23 +156,16 @@ impl Raw<'_> {
     }
 }
 
-/// What all costs together say.
-pub(super) struct Statistics {
-    pub(super) largest: f64,
-    pub(super) integers: bool,
-    pub(super) disguised: Option<f64>,
-}
-
-pub(super) fn statistics(raw: &Raw<'_>) -> Statistics {
+fn statistics(rooted: &Rooted<'_>) -> Statistics {
     let mut largest = f64::NEG_INFINITY;
     let mut magnitude: f64 = 0.0;
     let mut integers = true;
     let (mut entries, mut at_largest) = (0_u64, 0_u64);
-    for (a, b) in raw.pairs() {
-        if !raw.maybe_adjacent(a, b) || raw.enters_root(b) {
+    for (a, b) in rooted.pairs() {
+        if !rooted.maybe_adjacent(a, b) || rooted.enters_root(b) {
             continue;
         }
-        for cost in raw.entries(a, b) {
+        for cost in rooted.entries(a, b) {
             entries += 1;
             let Some(cost) = cost else { continue };
             integers &= cost.fract() == 0.0;
@@ -146,27 +176,31 @@ pub(super) fn statistics(raw: &Raw<'_>) -> Statistics {
             at_largest += u64::from(cost == largest);
         }
     }
-    let complete = !matches!(raw.instance.jump(), Jump::Table(_));
-    let common = at_largest as f64 >= DISGUISED_JUMPS * entries as f64;
+    let complete = !matches!(rooted.instance.jump(), Jump::Table(_));
+    let common = at_largest as f64 >= BIG_M_SHARE * entries as f64;
     if complete && common && largest > 0.0 {
         // The largest of the rest is the scale of the arcs; without a rest all costs are equal.
-        let rest =
-            raw.pairs().filter(|&(_, b)| !raw.enters_root(b)).flat_map(|(a, b)| raw.entries(a, b));
+        let rest = rooted
+            .pairs()
+            .filter(|&(_, b)| !rooted.enters_root(b))
+            .flat_map(|(a, b)| rooted.entries(a, b));
         let below = rest
             .flatten()
             .filter(|&c| c < largest)
             .fold(None, |m: Option<f64>, c| Some(m.map_or(c, |m| m.max(c))));
-        let same_price = match raw.instance.jump() {
-            Jump::Uniform(h) => *h == largest || entries_are_finite(raw),
-            _ => entries_are_finite(raw),
+        let same_price = match rooted.instance.jump() {
+            Jump::Uniform(h) => *h == largest || entries_are_finite(rooted),
+            _ => entries_are_finite(rooted),
         };
         if let Some(below) = below.filter(|&below| below > 0.0 && same_price) {
-            return Statistics { largest: below, integers, disguised: Some(largest) };
+            return Statistics { largest: below, integers, big_m: Some(largest) };
         }
     }
-    Statistics { largest: magnitude, integers, disguised: None }
+    Statistics { largest: magnitude, integers, big_m: None }
 }
 
-fn entries_are_finite(raw: &Raw<'_>) -> bool {
-    raw.pairs().all(|(a, b)| raw.maybe_adjacent(a, b) && raw.entries(a, b).all(|e| e.is_some()))
+fn entries_are_finite(rooted: &Rooted<'_>) -> bool {
+    rooted
+        .pairs()
+        .all(|(a, b)| rooted.maybe_adjacent(a, b) && rooted.entries(a, b).all(|e| e.is_some()))
 }

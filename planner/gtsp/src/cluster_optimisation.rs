@@ -1,12 +1,15 @@
-//! Best node choice for a fixed order of clusters: shortest paths through layers.
+//! Cluster optimisation: the cheapest nodes for a fixed order of clusters, by dynamic programming
+//! (Fischetti, Salazar González & Toth, Oper. Res. 45(3), 1997).
 
-use crate::order::Order;
+use crate::search_tour::SearchTour;
 use crate::table::Table;
 
-/// Scratch space for the layered shortest path.
+/// Scratch space of the dynamic program: one stage for each position.
 #[derive(Default)]
-pub(super) struct Layers {
+pub(super) struct ClusterOptimiser {
+    /// Cheapest path to each node of each stage, stage after stage.
     labels: Vec<i32>,
+    /// Where each stage begins.
     starts: Vec<usize>,
     choice: Vec<u32>,
 }
@@ -27,14 +30,14 @@ fn min_plus(from: &[i32], block: &[i32], out: &mut [i32]) {
     }
 }
 
-impl Layers {
+impl ClusterOptimiser {
     /// Re-chooses the nodes at positions `first..=last` (inside 1..m−1) for their neighbours'
     /// present nodes. Returns the change of the cost, at most 0; `changed` receives the clusters
     /// whose node is another one.
-    pub(super) fn window(
+    pub(super) fn optimise_window(
         &mut self,
         table: &Table,
-        tour: &mut Order,
+        tour: &mut SearchTour,
         first: usize,
         last: usize,
         changed: &mut Vec<u32>,
@@ -48,7 +51,7 @@ impl Layers {
         self.starts.push(0);
         self.labels.extend(row.iter().map(|d| d + add));
         for p in first + 1..=last {
-            self.push_layer(table, tour.order[p - 1], tour.order[p]);
+            self.push_stage(table, tour.order[p - 1], tour.order[p]);
         }
         let end = tour.order[last];
         let (add, column) = table.column(end, z, k);
@@ -78,7 +81,7 @@ impl Layers {
     }
 
     /// Re-chooses every node, the root's too: the best choice for this order.
-    pub(super) fn whole(&mut self, table: &Table, tour: &mut Order) {
+    pub(super) fn optimise_all(&mut self, table: &Table, tour: &mut SearchTour) {
         let m = tour.order.len();
         let root = tour.order[0];
         if m < 2 {
@@ -93,7 +96,7 @@ impl Layers {
             self.starts.push(0);
             self.labels.extend(row.iter().map(|d| d + add));
             for p in 2..m {
-                self.push_layer(table, tour.order[p - 1], tour.order[p]);
+                self.push_stage(table, tour.order[p - 1], tour.order[p]);
             }
             let end = tour.order[m - 1];
             let (add, column) = table.column(end, root, node);
@@ -123,7 +126,8 @@ impl Layers {
         }
     }
 
-    fn push_layer(&mut self, table: &Table, from: u32, to: u32) {
+    /// Labels of the stage after the last one.
+    fn push_stage(&mut self, table: &Table, from: u32, to: u32) {
         let start = self.labels.len();
         let previous = self.starts[self.starts.len() - 1];
         self.labels.resize(start + table.sizes[to as usize] as usize, 0);

@@ -4,14 +4,14 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::local::LocalSearch;
-use crate::order::Order;
+use crate::search_tour::SearchTour;
 use crate::table::Table;
 
 /// Longest of the two stretches that a kick exchanges.
 const KICK: usize = 30;
 
 /// A randomised nearest-neighbour tour, nodes chosen as it goes.
-pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> Order {
+pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> SearchTour {
     let m = table.m;
     // Some tours keep to the nearest, some stray.
     let odds = rng.random_range(2..12);
@@ -24,7 +24,7 @@ pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> Order {
         order.push(here);
         visited[here as usize] = true;
         if order.len() == m {
-            return Order::new(table, order, chosen);
+            return SearchTour::new(table, order, chosen);
         }
         let mut best = (i32::MAX, here, 0);
         let consider = |b: u32, best: &mut (i32, u32, u32), skip: bool| {
@@ -53,17 +53,17 @@ pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> Order {
 }
 
 /// Brings a fresh tour to a local optimum.
-pub(super) fn settle(table: &Table, local: &mut LocalSearch, tour: &mut Order) {
+pub(super) fn descend(table: &Table, local: &mut LocalSearch, tour: &mut SearchTour) {
     for &c in &tour.order {
         local.push(c);
     }
     local.run(table, tour);
-    local.layers.whole(table, tour);
+    local.optimiser.optimise_all(table, tour);
 }
 
 /// The optimum of a tour of so few clusters that the local search has no room: every order, each
 /// with its best nodes.
-pub(super) fn enumerate(table: &Table, local: &mut LocalSearch, tour: &mut Order) {
+pub(super) fn enumerate(table: &Table, local: &mut LocalSearch, tour: &mut SearchTour) {
     let m = table.m;
     let mut best = tour.clone();
     let mut counters = vec![0; m];
@@ -73,8 +73,8 @@ pub(super) fn enumerate(table: &Table, local: &mut LocalSearch, tour: &mut Order
         if counters[k] + 1 < k {
             let (x, y) = if k % 2 == 1 { (1, k) } else { (1 + counters[k], k) };
             tour.order.swap(x, y);
-            *tour = Order::new(table, tour.order.clone(), tour.chosen.clone());
-            local.layers.whole(table, tour);
+            *tour = SearchTour::new(table, tour.order.clone(), tour.chosen.clone());
+            local.optimiser.optimise_all(table, tour);
             if tour.cost < best.cost {
                 best.copy_from(tour);
             }
@@ -104,7 +104,7 @@ pub(super) struct Cooling {
 pub(super) fn iterate(
     table: &Table,
     local: &mut LocalSearch,
-    tour: &mut Order,
+    tour: &mut SearchTour,
     cooling: Cooling,
     rng: &mut ChaCha8Rng,
     stop: &dyn Fn() -> bool,
@@ -140,14 +140,14 @@ pub(super) fn iterate(
             tour.copy_from(&kept);
         }
     }
-    local.layers.whole(table, &mut best);
+    local.optimiser.optimise_all(table, &mut best);
     tour.copy_from(&best);
     made
 }
 
 /// Turns the order of two or three neighbouring stretches around at a random place; of three, so
 /// that no single exchange of the local search undoes it.
-fn kick(table: &Table, local: &mut LocalSearch, tour: &mut Order, rng: &mut ChaCha8Rng) {
+fn kick(table: &Table, local: &mut LocalSearch, tour: &mut SearchTour, rng: &mut ChaCha8Rng) {
     let m = tour.order.len();
     let longest = KICK.min((m - 2) / 3).max(1);
     let third = if rng.random::<bool>() { rng.random_range(1..=longest) } else { 0 };
@@ -161,8 +161,8 @@ fn kick(table: &Table, local: &mut LocalSearch, tour: &mut Order, rng: &mut ChaC
     if third > 0 {
         tour.exchange(first, first + lengths[1], first + lengths[1] + third - 1);
     }
-    let joints = [first - 1, first + third - 1, first + third + lengths[1] - 1, last];
-    for p in joints {
+    let ends = [first - 1, first + third - 1, first + third + lengths[1] - 1, last];
+    for p in ends {
         tour.refresh(table, p);
         local.push(tour.at(p).0);
         local.push(tour.at(p + 1).0);
