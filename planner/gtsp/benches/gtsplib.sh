@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Table of name, value, gap and seconds over all GTSPLIB instances of a directory.
 #
-#   planner/gtsp/benches/gtsplib.sh DIR [SEEDS [THREADS]]
+#   benches/gtsplib.sh DIR [SEEDS [THREADS]]
 #
 # DIR holds *.gtsp and, for the gaps, bestknown.tsv (name, clusters, nodes, best value, …).
 # Every instance is solved with seeds 1..SEEDS (5) on THREADS threads (1) within the limit of its
@@ -17,10 +17,10 @@ fi
 dir=$1
 seeds=${2:-5}
 threads=${3:-1}
-root=$(cd "$(dirname "$0")/../../.." && pwd)
+manifest=$(cd "$(dirname "$0")/.." && pwd)/Cargo.toml
+gtsplib() { cargo run --quiet --release --manifest-path "$manifest" --example gtsplib -- "$@"; }
 
-cargo build --quiet --release --manifest-path "$root/Cargo.toml" -p nullsweep-cli --bin planner
-target=${CARGO_TARGET_DIR:-$root/target}
+cargo build --quiet --release --manifest-path "$manifest" --example gtsplib
 
 printf 'name\tvalue\tgap%%\tworst%%\tseconds\n'
 for file in "$dir"/*.gtsp; do
@@ -30,9 +30,7 @@ for file in "$dir"/*.gtsp; do
     limit=10
     if ((clusters <= 60)); then limit=1; elif ((clusters <= 115)); then limit=5; fi
     for ((seed = 1; seed <= seeds; seed++)); do
-        "$target/release/planner" gtsp "$file" --seconds "$limit" --seed "$seed" \
-            --threads "$threads" ${best:+--best "$best"} --json - |
-            sed 's/.*"value":\([^,]*\),.*"seconds":\([^,]*\),.*/\1 \2/'
+        gtsplib "$file" "$limit" "$seed" "$threads" ${best:+"$best"}
     done | sort -g | awk -v name="$name" -v best="$best" '
         { value[NR] = $1; seconds += $2 }
         function gap(v) { return best == "" ? "-" : sprintf("%.4f", 100 * (v - best) / best) }

@@ -14,8 +14,9 @@ const MOST_PAIRS: usize = 4_000_000;
 /// Steps of the subgradient ascent.
 const STEPS: usize = 200;
 
-/// A number that no tour costs less than; `None` for instances where it would not be cheap, of
-/// fewer than three clusters, or whose clusters are not all joined by arcs.
+/// A number that no tour costs less than, in the unit of the costs; `None` for instances of fewer
+/// than 3 or more than 600 clusters (the fixed start of an open path counts as one) or of more than
+/// 2000 nodes, and where some cluster cannot be reached from another by an arc or a jump.
 pub fn lower_bound(instance: &Instance) -> Option<f64> {
     let closed = Closed::new(instance);
     let (n, m) = (closed.nodes.len(), closed.clusters);

@@ -1,13 +1,17 @@
 //! The instance: clusters of nodes, arc costs between them, the price of a jump, and the tour's ends.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 
-/// A generalized travelling-salesman instance: visit every cluster once, at one node of each.
+/// A generalised travelling-salesman instance: visit every cluster once, at one node of each.
 ///
-/// Nodes are named (cluster, node within the cluster). Costs are unitless, may be asymmetric and
-/// negative. A finite entry is an arc; `+inf`, or a cluster pair without a block, is *not* an arc:
-/// passing there is a **jump**, priced by [`Jump`] and counted apart.
+/// Clusters count from 0, nodes from 0 within their cluster. Costs may have any unit, the same as
+/// the jump prices; they may be asymmetric and negative. A finite entry is an arc; `+inf`, or a
+/// cluster pair without a block, is *not* an arc: passing there is a **jump**, priced by [`Jump`]
+/// and counted apart.
+///
+/// A clone shares the costs.
 #[derive(Clone)]
 pub struct Instance {
     sizes: Vec<usize>,
@@ -18,9 +22,11 @@ pub struct Instance {
 }
 
 /// Arc costs between the nodes of different clusters.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Costs {
-    /// Row-major n×n over all nodes in cluster order, n = the sum of the sizes. Entries inside one
-    /// cluster are never read.
+    /// Row-major n×n over all nodes in cluster order, n = the sum of the sizes; `+inf` where there
+    /// is no arc. Entries inside one cluster are never read.
     Dense(Vec<f64>),
     /// Blocks of adjacent cluster pairs only; every other pair is a jump. Give both directions of
     /// a symmetric pair (see [`Block::both_ways`]).
@@ -41,7 +47,8 @@ pub struct Block {
 }
 
 impl Block {
-    /// The block and its transpose: `rows` = |from|, a symmetric pair of clusters.
+    /// The block and its transpose, for a symmetric pair of clusters: `rows` = |from|, `costs` as in
+    /// [`Block::costs`]. [`Instance::new`] finds a length that does not fit.
     pub fn both_ways(from: usize, to: usize, rows: usize, costs: Vec<f64>) -> [Self; 2] {
         let columns = costs.len() / rows.max(1);
         let transposed = (0..columns)
@@ -52,7 +59,8 @@ impl Block {
     }
 }
 
-/// Costs from a function of (cluster, node, cluster, node); it must be pure.
+/// Costs from a function. The solver reads them at the start and keeps a copy; later it asks only
+/// for the arcs of tours that it has found.
 #[derive(Clone)]
 pub struct OnDemand {
     /// For each cluster the clusters that its arcs enter; `None`: all of them.
@@ -61,22 +69,31 @@ pub struct OnDemand {
     pub cost: CostFn,
 }
 
-/// See [`OnDemand::cost`].
+impl fmt::Debug for OnDemand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OnDemand").field("neighbours", &self.neighbours).finish_non_exhaustive()
+    }
+}
+
+/// Cost of the arc from (cluster, node) to (cluster, node), in this order of arguments. It must be
+/// pure: the same for the same arguments.
 pub type CostFn = Arc<dyn Fn(usize, usize, usize, usize) -> f64 + Send + Sync>;
 
-/// Price of going from one cluster to another where no arc exists.
+/// Price of going from one cluster to another where no arc exists, in the unit of the costs.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Jump {
     /// A tour with a jump is infeasible: its total cost is `+inf`.
     Forbidden,
     /// One price for every pair.
     Uniform(f64),
-    /// Row-major |clusters|×|clusters|, for example estimates of the transfer motion.
+    /// Row-major |clusters|×|clusters|: a price for every ordered pair, that of the diagonal unused.
     Table(Vec<f64>),
 }
 
 /// How the tour begins and ends.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Ends {
     /// A closed tour.
     Closed,
@@ -88,26 +105,9 @@ pub enum Ends {
     OpenFromCluster(usize),
 }
 
-/// A number that a cost can be made of.
-pub trait Weight: Copy {
-    /// The nearest f64.
-    fn to_f64(self) -> f64;
-}
-
-macro_rules! weights {
-    ($($t:ty),*) => { $(impl Weight for $t { fn to_f64(self) -> f64 { self as f64 } })* };
-}
-weights!(f32, f64, i16, u16, i32, u32, i64, u64);
-
-impl Costs {
-    /// Dense costs from any kind of number.
-    pub fn dense<W: Weight>(matrix: &[W]) -> Self {
-        Self::Dense(matrix.iter().map(|w| w.to_f64()).collect())
-    }
-}
-
 /// What is wrong with the parts of an instance.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InstanceError {
     /// There is nothing to visit.
     #[error("the instance has no clusters: give at least one")]
@@ -128,9 +128,9 @@ pub enum InstanceError {
         /// Entries needed.
         expected: usize,
     },
-    /// A cluster index is out of range, or a block joins a cluster with itself.
-    #[error("block {from} → {to}: indices must differ and be below {clusters}")]
-    BlockIndex {
+    /// A cluster index of a block or neighbour list is out of range, or joins a cluster with itself.
+    #[error("arcs from cluster {from} to {to}: the two must differ and be below {clusters}")]
+    ClusterPair {
         /// Cluster left.
         from: usize,
         /// Cluster entered.
@@ -155,18 +155,22 @@ pub enum InstanceError {
         clusters: usize,
     },
     /// A cost is NaN or −inf.
-    #[error("{what}: the cost {value} is neither finite nor +inf")]
+    #[error("{what}, entry {entry}: the cost {value} is neither finite nor +inf")]
     Cost {
-        /// Where it stands.
+        /// Which array.
         what: String,
+        /// Index of the entry, from 0.
+        entry: usize,
         /// The value.
         value: f64,
     },
     /// A jump price is not finite.
     #[error(
-        "the jump price {value} is not finite; use Jump::Forbidden where jumps are not allowed"
+        "jump price {value} of entry {entry} is not finite; use Jump::Forbidden to allow no jumps"
     )]
     JumpPrice {
+        /// Index of the entry of a table, 0 for a uniform price.
+        entry: usize,
         /// The value.
         value: f64,
     },
@@ -184,6 +188,10 @@ const ABSENT: usize = usize::MAX;
 impl Instance {
     /// A checked instance of clusters with `sizes` nodes. On-demand costs are not checked here; a
     /// NaN or −inf from them counts as "no arc".
+    ///
+    /// # Errors
+    /// Where a cluster is empty, an array has the wrong length, an index is out of range, or a cost
+    /// or price is not a number that can be used.
     pub fn new(
         sizes: &[usize],
         costs: Costs,
@@ -213,7 +221,7 @@ impl Instance {
             Ends::Closed => {}
             Ends::OpenFromCosts(start) => {
                 check_length("the start costs", start.len(), n)?;
-                check_costs("start costs", start)?;
+                check_costs("the start costs", start, 0..n)?;
             }
             &Ends::OpenFromCluster(cluster) if cluster >= m => {
                 return Err(InstanceError::StartCluster { cluster, clusters: m });
@@ -224,13 +232,10 @@ impl Instance {
             Costs::Dense(matrix) => {
                 check_length("the dense matrix", matrix.len(), n * n)?;
                 for a in 0..m {
-                    for row in offsets[a]..offsets[a + 1] {
-                        let (inside, outside) = (offsets[a], offsets[a + 1]);
-                        for range in [0..inside, outside..n] {
-                            check_costs(
-                                "the dense matrix",
-                                &matrix[row * n + range.start..row * n + range.end],
-                            )?;
+                    let (inside, outside) = (offsets[a], offsets[a + 1]);
+                    for row in inside..outside {
+                        for range in [row * n..row * n + inside, row * n + outside..(row + 1) * n] {
+                            check_costs("the dense matrix", &matrix, range)?;
                         }
                     }
                 }
@@ -238,26 +243,7 @@ impl Instance {
             }
             Costs::Blocks(blocks) => pack(sizes, blocks)?,
             Costs::OnDemand(OnDemand { neighbours, cost }) => {
-                let adjacent = match neighbours {
-                    None => None,
-                    Some(lists) => {
-                        check_length("the neighbour lists", lists.len(), m)?;
-                        let mut table = vec![false; m * m];
-                        for (from, list) in lists.iter().enumerate() {
-                            for &to in list {
-                                if to >= m || to == from {
-                                    return Err(InstanceError::BlockIndex {
-                                        from,
-                                        to,
-                                        clusters: m,
-                                    });
-                                }
-                                table[from * m + to] = true;
-                            }
-                        }
-                        Some(table.into())
-                    }
-                };
+                let adjacent = neighbours.map(|lists| adjacency(m, &lists)).transpose()?;
                 Store::OnDemand { adjacent, cost }
             }
         };
@@ -280,6 +266,9 @@ impl Instance {
     }
 
     /// Index of a node among all nodes in cluster order.
+    ///
+    /// # Panics
+    /// Where there is no such cluster.
     pub fn node_index(&self, cluster: usize, node: usize) -> usize {
         self.offsets[cluster] + node
     }
@@ -296,6 +285,9 @@ impl Instance {
 
     /// Cost of the arc from node `i` of cluster `a` to node `j` of another cluster `b`; `None`
     /// where only a jump leads there.
+    ///
+    /// # Panics
+    /// May panic where a cluster or node does not exist.
     pub fn arc(&self, a: usize, i: usize, b: usize, j: usize) -> Option<f64> {
         let cost = match &self.store {
             Store::Dense(matrix) => {
@@ -316,7 +308,10 @@ impl Instance {
         cost.is_finite().then_some(cost)
     }
 
-    /// Whether some arc may lead from cluster `a` to cluster `b`.
+    /// Whether some arc may lead from cluster `a` to another cluster `b`.
+    ///
+    /// # Panics
+    /// May panic where a cluster does not exist.
     pub fn adjacent(&self, a: usize, b: usize) -> bool {
         let at = a * self.sizes.len() + b;
         match &self.store {
@@ -327,6 +322,9 @@ impl Instance {
     }
 
     /// Price of a jump from cluster `a` to cluster `b`; `+inf` where jumps are forbidden.
+    ///
+    /// # Panics
+    /// May panic where a cluster does not exist.
     pub fn jump_price(&self, a: usize, b: usize) -> f64 {
         match &self.jump {
             Jump::Forbidden => f64::INFINITY,
@@ -335,7 +333,8 @@ impl Instance {
         }
     }
 
-    /// Price of a jump from the fixed start of [`Ends::OpenFromCosts`].
+    /// Price of a jump from the fixed start of [`Ends::OpenFromCosts`]: the uniform price or the
+    /// largest of the table, `+inf` where jumps are forbidden.
     pub fn start_jump_price(&self) -> f64 {
         match &self.jump {
             Jump::Forbidden => f64::INFINITY,
@@ -354,24 +353,40 @@ impl fmt::Debug for Instance {
     }
 }
 
+/// Packs blocks into one array, checked.
 fn pack(sizes: &[usize], blocks: Vec<Block>) -> Result<Store, InstanceError> {
     let m = sizes.len();
     let mut index = vec![ABSENT; m * m];
     let mut data = Vec::with_capacity(blocks.iter().map(|b| b.costs.len()).sum());
     for Block { from, to, costs } in blocks {
         if from >= m || to >= m || from == to {
-            return Err(InstanceError::BlockIndex { from, to, clusters: m });
+            return Err(InstanceError::ClusterPair { from, to, clusters: m });
         }
         if index[from * m + to] != ABSENT {
             return Err(InstanceError::DuplicateBlock { from, to });
         }
         let what = format!("block {from} → {to}");
         check_length(&what, costs.len(), sizes[from] * sizes[to])?;
-        check_costs(&what, &costs)?;
+        check_costs(&what, &costs, 0..costs.len())?;
         index[from * m + to] = data.len();
         data.extend_from_slice(&costs);
     }
     Ok(Store::Blocks { index: index.into(), data: data.into() })
+}
+
+/// Row-major table of the cluster pairs that neighbour lists join.
+fn adjacency(m: usize, lists: &[Vec<usize>]) -> Result<Arc<[bool]>, InstanceError> {
+    check_length("the neighbour lists", lists.len(), m)?;
+    let mut table = vec![false; m * m];
+    for (from, list) in lists.iter().enumerate() {
+        for &to in list {
+            if to >= m || to == from {
+                return Err(InstanceError::ClusterPair { from, to, clusters: m });
+            }
+            table[from * m + to] = true;
+        }
+    }
+    Ok(table.into())
 }
 
 fn check_length(what: &str, found: usize, expected: usize) -> Result<(), InstanceError> {
@@ -382,16 +397,21 @@ fn check_length(what: &str, found: usize, expected: usize) -> Result<(), Instanc
     }
 }
 
-fn check_costs(what: &str, costs: &[f64]) -> Result<(), InstanceError> {
-    match costs.iter().find(|c| c.is_nan() || **c == f64::NEG_INFINITY) {
+/// Checks the costs of a range of an array.
+fn check_costs(what: &str, array: &[f64], range: Range<usize>) -> Result<(), InstanceError> {
+    let wrong = |c: &f64| c.is_nan() || *c == f64::NEG_INFINITY;
+    match array[range.clone()].iter().position(wrong) {
         None => Ok(()),
-        Some(&value) => Err(InstanceError::Cost { what: what.to_owned(), value }),
+        Some(k) => {
+            let entry = range.start + k;
+            Err(InstanceError::Cost { what: what.to_owned(), entry, value: array[entry] })
+        }
     }
 }
 
 fn check_prices(prices: &[f64]) -> Result<(), InstanceError> {
-    match prices.iter().find(|p| !p.is_finite()) {
+    match prices.iter().position(|p| !p.is_finite()) {
         None => Ok(()),
-        Some(&value) => Err(InstanceError::JumpPrice { value }),
+        Some(entry) => Err(InstanceError::JumpPrice { entry, value: prices[entry] }),
     }
 }

@@ -9,6 +9,7 @@ use crate::tour::{Tour, TourCost};
 
 /// State of the search, told whenever the best tour has improved.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Progress<'a> {
     /// Best tour so far.
     pub tour: &'a Tour,

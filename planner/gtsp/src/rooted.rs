@@ -33,7 +33,8 @@ pub(super) struct Statistics {
 }
 
 impl<'a> Rooted<'a> {
-    pub(super) fn new(instance: &'a Instance) -> Self {
+    /// `None` where 32 bits do not count the costs that are kept.
+    pub(super) fn new(instance: &'a Instance) -> Option<Self> {
         let clusters = instance.clusters();
         let (root, m) = match *instance.ends() {
             Ends::OpenFromCosts(_) => (clusters, clusters + 1),
@@ -44,13 +45,21 @@ impl<'a> Rooted<'a> {
         };
         let mut rooted = Self { instance, m, root, statistics: Statistics::default(), kept: None };
         rooted.keep_what_fits();
+        // By rows and by columns, and the block of zeros that absent ones share.
+        let entries = 2 * rooted.stored_entries() + rooted.widest() * rooted.widest();
+        u32::try_from(entries).ok()?;
         rooted.statistics = statistics(&rooted);
-        rooted
+        Some(rooted)
     }
 
     /// Number of nodes; the fixed start has one.
     pub(super) fn size(&self, a: usize) -> usize {
         self.instance.sizes().get(a).copied().unwrap_or(1)
+    }
+
+    /// Largest number of nodes of a cluster.
+    pub(super) fn widest(&self) -> usize {
+        self.instance.sizes().iter().copied().max().unwrap_or(1)
     }
 
     /// Whether the search sees some arc from `a` to `b`.
@@ -135,7 +144,7 @@ impl<'a> Rooted<'a> {
     }
 
     /// Entries of the blocks that the search sees.
-    pub(super) fn stored_entries(&self) -> usize {
+    fn stored_entries(&self) -> usize {
         self.pairs()
             .filter(|&(a, b)| self.maybe_adjacent(a, b))
             .map(|(a, b)| self.size(a) * self.size(b))

@@ -1,5 +1,6 @@
-//! The solver's front: budget, progress, cancellation, and the rounds of the search.
+//! The solver's front: budget, cancellation, and the epochs of the search.
 
+use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -18,13 +19,14 @@ use crate::search_tour::SearchTour;
 use crate::table::Table;
 use crate::tour::{Tour, TourCost};
 
-/// Limits on the work.
+/// Limits on the work: set trials, time or both.
 ///
-/// With trials alone the result depends on (instance, seed, trials) and nothing else. A time limit
-/// cuts the search wherever it then stands.
+/// Without a time limit the result depends on (instance, seed, trials, target) and nothing else, not
+/// on the number of threads. A time limit cuts the search wherever it then stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Budget {
-    /// Trials (kick, local search, acceptance); rounded up to whole rounds of runs.
+    /// Trials: kicks with their local search, and children of a crossing. The last generation is
+    /// completed, so more may be made.
     pub trials: Option<u64>,
     /// Wall-clock limit.
     pub time: Option<Duration>,
@@ -48,6 +50,7 @@ impl Budget {
 
 /// The best tour found.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Solution {
     /// Order of the clusters and the node chosen in each.
     pub tour: Tour,
@@ -57,7 +60,7 @@ pub struct Solution {
     pub trials: u64,
     /// Time spent.
     pub elapsed: Duration,
-    /// No tour costs less than this.
+    /// No tour costs less than this; `None` where [`lower_bound`] has none.
     pub lower_bound: Option<f64>,
 }
 
@@ -72,12 +75,13 @@ impl Solution {
 }
 
 /// Why there is nothing to return.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SolveError {
     /// Neither trials nor time limit the search.
     #[error("the budget has no limit: set trials, time or both")]
     NoLimit,
-    /// The search keeps its costs in one list that 32 bits count.
+    /// The search keeps more costs than 32 bits count.
     #[error(
         "{nodes} nodes in {clusters} clusters are too many: the search counts costs in 32 bits"
     )]
@@ -88,10 +92,12 @@ pub enum SolveError {
         nodes: usize,
     },
     /// The thread pool could not be made.
-    #[error("could not start {threads} threads")]
+    #[error("could not start {threads} threads (0: one for every core): {reason}")]
     Threads {
         /// Threads asked for.
         threads: usize,
+        /// What the thread pool said.
+        reason: String,
     },
 }
 
@@ -102,17 +108,34 @@ pub struct Control<'a> {
     pub progress: Option<&'a mut Observer<'a>>,
     /// Set it from any thread: the search ends within milliseconds, the best tour is returned.
     pub cancel: Option<&'a AtomicBool>,
-    /// A tour of the same instance that the search goes on from; the result is never worse.
+    /// A tour of the same instance that the search goes on from; the result is never worse. One that
+    /// does not fit the instance is passed over.
     pub start: Option<&'a Tour>,
 }
 
-/// Best tour found within the budget; the same for the same (instance, seed, trials) whatever the
-/// number of threads.
+impl fmt::Debug for Control<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Control")
+            .field("progress", &self.progress.is_some())
+            .field("cancel", &self.cancel)
+            .field("start", &self.start)
+            .finish()
+    }
+}
+
+/// Best tour found within the budget; see [`Budget`] for what it depends on. Instances of a few
+/// clusters are solved exactly, whatever the budget.
+///
+/// # Errors
+/// Where the budget has no limit, the instance is too large, or the threads do not start.
 pub fn solve(instance: &Instance, budget: &Budget, seed: u64) -> Result<Solution, SolveError> {
     solve_with(instance, budget, seed, Control::default())
 }
 
 /// [`solve`], watched and cancellable.
+///
+/// # Errors
+/// As [`solve`].
 pub fn solve_with(
     instance: &Instance,
     budget: &Budget,
@@ -146,7 +169,7 @@ pub fn solve_with(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(budget.threads)
         .build()
-        .map_err(|_| SolveError::Threads { threads: budget.threads })?;
+        .map_err(|e| SolveError::Threads { threads: budget.threads, reason: e.to_string() })?;
     let full = Table::new(instance)
         .ok_or(SolveError::TooLarge { clusters: instance.clusters(), nodes: instance.nodes() })?;
     Ok(pool.install(|| run_epochs(instance, &full, budget, seed, control, started)))

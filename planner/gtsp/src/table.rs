@@ -1,7 +1,7 @@
 //! The search's own copy of the costs: integers in blocks of cluster pairs, and candidate lists.
 //!
-//! Costs become i32 (exactly so where they are small integers), so that sums are exact and every
-//! machine takes the same decisions. Jumps get a search price that is high against every arc but
+//! Costs become i32 (exactly so where they are small integers), so that sums are exact whatever
+//! their order. Jumps get a search price that is high against every arc but
 //! no higher, so that a huge h neither overflows nor freezes the search; what a tour really costs
 //! is always taken from the instance.
 
@@ -56,17 +56,12 @@ struct Pair {
 }
 
 impl Table {
-    /// The costs of an instance; `None` where they are too many to be told apart by 32 bits.
+    /// The costs of an instance; `None` where 32 bits do not count them.
     pub(super) fn new(instance: &Instance) -> Option<Self> {
-        let rooted = Rooted::new(instance);
+        let rooted = Rooted::new(instance)?;
         let (root, m) = (rooted.root, rooted.m);
         let sizes: Vec<u32> = (0..m).map(|a| rooted.size(a) as u32).collect();
-        let widest = sizes.iter().copied().max().unwrap_or(1) as usize;
-        // By rows and by columns, and the shared block of zeros.
-        let room = 2 * rooted.stored_entries() + widest * widest + LANES;
-        u32::try_from(room).ok()?;
-
-        let mut blocks = Blocks::of(&rooted, widest);
+        let mut blocks = Blocks::of(&rooted);
         let reversible = blocks.reversible(&rooted);
         let transposed = blocks.transpose(&rooted, reversible);
         let Blocks { pairs, mut data, lowest } = blocks;
@@ -326,8 +321,8 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn of(rooted: &Rooted<'_>, widest: usize) -> Self {
-        let m = rooted.m;
+    fn of(rooted: &Rooted<'_>) -> Self {
+        let (m, widest) = (rooted.m, rooted.widest());
         let quantise = quantiser(rooted);
         let mut data = vec![0; widest * widest];
         let mut pairs = vec![Pair { at: 0, add: 0 }; m * m];

@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use crate::solve::run_epochs;
 use crate::table::Table;
 use crate::{
-    Block, Budget, Control, Costs, Ends, Instance, Jump, OnDemand, Solution, Tour, TourError,
-    lower_bound, solve, solve_exact, solve_with, tsplib,
+    Block, Budget, Control, Costs, Ends, Instance, InstanceError, Jump, OnDemand, Progress,
+    Solution, SolveError, Tour, TourError, lower_bound, solve, solve_exact, solve_with, tsplib,
 };
 
 #[derive(Clone, Copy, Debug)]
@@ -153,6 +153,82 @@ proptest! {
 }
 
 #[test]
+fn the_same_seed_gives_the_same_tour_on_any_number_of_threads() {
+    let made = KINDS.map(|kind| random_instance(kind, 30, 6, 1, 4));
+    // Its clusters are wide enough for candidate nodes.
+    for instance in made.iter().chain([&scattered(20, 50.0, 8)]) {
+        let [one, two, four] = [1, 2, 4].map(|threads| {
+            let budget = Budget { threads, ..Budget::trials(3000) };
+            let found = solve(instance, &budget, 7).expect("limited");
+            (found.tour, found.cost, found.trials)
+        });
+        assert_eq!(one, two);
+        assert_eq!(one, four);
+    }
+}
+
+#[test]
+fn the_readme_shows_the_example() {
+    let example = include_str!("../examples/solve.rs");
+    let code = &example[example.find("use ").expect("imports")..];
+    assert!(include_str!("../README.md").contains(code), "README.md and examples/solve.rs differ");
+}
+
+#[test]
+fn bad_instances_are_named() {
+    let dense = |costs: Vec<f64>, jump, ends| {
+        Instance::new(&[1, 2], Costs::Dense(costs), jump, ends).expect_err("does not fit")
+    };
+    let mut costs = vec![1.0; 9];
+    assert_eq!(
+        dense(vec![1.0; 8], Jump::Forbidden, Ends::Closed).to_string(),
+        "the dense matrix has 8 entries, expected 9"
+    );
+    assert_eq!(
+        dense(costs.clone(), Jump::Table(vec![1.0, 2.0, f64::INFINITY, 0.0]), Ends::Closed),
+        InstanceError::JumpPrice { entry: 2, value: f64::INFINITY }
+    );
+    assert_eq!(
+        dense(costs.clone(), Jump::Forbidden, Ends::OpenFromCluster(2)),
+        InstanceError::StartCluster { cluster: 2, clusters: 2 }
+    );
+    costs[5] = f64::NAN; // inside the second cluster: never read
+    costs[6] = f64::NEG_INFINITY;
+    assert_eq!(
+        dense(costs, Jump::Forbidden, Ends::Closed),
+        InstanceError::Cost {
+            what: "the dense matrix".to_owned(),
+            entry: 6,
+            value: f64::NEG_INFINITY
+        }
+    );
+    let neighbours = Some(vec![vec![1], vec![1]]);
+    let on_demand = OnDemand { neighbours, cost: std::sync::Arc::new(|_, _, _, _| 1.0) };
+    assert_eq!(
+        Instance::new(&[1, 2], Costs::OnDemand(on_demand), Jump::Forbidden, Ends::Closed)
+            .expect_err("a cluster joined with itself"),
+        InstanceError::ClusterPair { from: 1, to: 1, clusters: 2 }
+    );
+}
+
+#[test]
+fn a_budget_without_a_limit_is_refused() {
+    let instance = random_instance(KINDS[0], 3, 2, 0, 1);
+    let unlimited = Budget { trials: None, ..Budget::trials(0) };
+    assert_eq!(solve(&instance, &unlimited, 1), Err(SolveError::NoLimit));
+}
+
+#[test]
+fn more_costs_than_32_bits_count_are_refused() {
+    let cost = std::sync::Arc::new(|_, i, _, j| (i * j) as f64);
+    let costs = Costs::OnDemand(OnDemand { neighbours: None, cost });
+    let instance =
+        Instance::new(&[10_000; 20], costs, Jump::Forbidden, Ends::Closed).expect("fits");
+    let error = SolveError::TooLarge { clusters: 20, nodes: 200_000 };
+    assert_eq!(solve(&instance, &Budget::trials(1), 1), Err(error));
+}
+
+#[test]
 fn one_cluster_costs_nothing() {
     let costs = || Costs::Dense(vec![0.0; 9]);
     let closed = Instance::new(&[3], costs(), Jump::Forbidden, Ends::Closed).expect("fits");
@@ -206,7 +282,7 @@ fn costs_on_demand_equal_stored_ones() {
 fn progress_improves_and_can_stop_the_search() {
     let instance = random_instance(KINDS[0], 40, 4, 0, 1);
     let mut told = Vec::new();
-    let mut observe = |p: &super::Progress<'_>| {
+    let mut observe = |p: &Progress<'_>| {
         p.tour.check(&instance).expect("valid");
         told.push(p.cost.total());
         if told.len() == 2 {
@@ -241,16 +317,18 @@ fn a_search_goes_on_from_a_tour() {
 
 #[test]
 fn published_optima_are_reached() {
-    let dir =
-        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/gtsplib"));
+    let dir = std::env::var_os("GTSPLIB").map_or_else(
+        || concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/gtsplib").into(),
+        std::path::PathBuf::from,
+    );
     if !dir.is_dir() {
-        eprintln!("skipped: no GTSPLIB instances at {}", dir.display());
+        eprintln!("skipped: no GTSPLIB instances at {}; name them by GTSPLIB=DIR", dir.display());
         return;
     }
     for (name, optimum) in
         [("11berlin52", 4040.0), ("14ft70", 7707.0), ("35ftv170", 1205.0), ("53gil262", 1013.0)]
     {
-        let file = tsplib::read_gtsp(&dir.join(name).with_extension("gtsp")).expect("readable");
+        let file = tsplib::read_gtsp(dir.join(name).with_extension("gtsp")).expect("readable");
         let budget = Budget { target: Some(optimum), ..Budget::trials(60_000) };
         let solution = solve(&file.instance, &budget, 1).expect("limited");
         solution.tour.check(&file.instance).expect("valid");

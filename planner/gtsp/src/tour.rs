@@ -14,7 +14,7 @@ pub struct Tour {
     pub nodes: Vec<usize>,
 }
 
-/// What a tour costs; jumps are counted apart from the arcs.
+/// What a tour costs, in the unit of the instance's costs; jumps are counted apart from the arcs.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct TourCost {
     /// Sum of the arcs that are no jumps.
@@ -26,7 +26,7 @@ pub struct TourCost {
 }
 
 impl TourCost {
-    /// The objective.
+    /// The objective: arcs and jumps together.
     pub fn total(&self) -> f64 {
         self.finite + self.jump_cost
     }
@@ -52,6 +52,7 @@ impl TourCost {
 
 /// Why a tour does not fit an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TourError {
     /// Wrong number of entries.
     #[error("the tour visits {clusters} clusters at {nodes} nodes, expected {expected} of each")]
@@ -91,6 +92,9 @@ pub enum TourError {
 
 impl Tour {
     /// Checks that every cluster is visited once at a node of its own, from the right start.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
     pub fn check(&self, instance: &Instance) -> Result<(), TourError> {
         let m = instance.clusters();
         if self.clusters.len() != m || self.nodes.len() != m {
@@ -117,8 +121,10 @@ impl Tour {
         }
     }
 
-    /// Cost of the tour, arc by arc from the instance. Panics on a tour that [`Tour::check`]
-    /// rejects.
+    /// Cost of the tour, arc by arc from the instance.
+    ///
+    /// # Panics
+    /// May panic on a tour that [`Tour::check`] rejects.
     pub fn cost(&self, instance: &Instance) -> TourCost {
         let mut cost = TourCost::default();
         let m = self.clusters.len();

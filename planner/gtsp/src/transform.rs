@@ -11,8 +11,9 @@ use crate::closed::Closed;
 use crate::instance::Instance;
 use crate::tour::{Tour, TourCost};
 
-/// The asymmetric TSP of an instance.
+/// The asymmetric TSP of an instance, for any solver of those.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Transformed {
     /// Row-major n×n over the nodes in cluster order (and the fixed start, if there is one).
     pub matrix: Vec<i64>,
@@ -30,7 +31,8 @@ pub struct Transformed {
 /// Largest sum of costs that the matrix is scaled to.
 const LARGEST_SUM: f64 = 1e9;
 
-/// The transformed instance.
+/// The instance as an asymmetric TSP over single nodes; the matrix takes 8 bytes for each pair of
+/// nodes.
 pub fn transform(instance: &Instance) -> Transformed {
     let closed = Closed::new(instance);
     let (n, m) = (closed.nodes.len(), closed.clusters);
@@ -66,7 +68,10 @@ pub fn transform(instance: &Instance) -> Transformed {
 
 impl Transformed {
     /// The instance's tour from an order of the ATSP's nodes: the first node of each cluster in
-    /// the order in which the clusters are first met.
+    /// the order in which the clusters are first met. `None` where the order lacks a fixed start.
+    ///
+    /// # Panics
+    /// Where the order names a node that does not exist.
     pub fn tour(&self, instance: &Instance, order: &[usize]) -> Option<Tour> {
         let n = order.len();
         let cluster = |k: usize| self.cluster_of[order[k % n]];
@@ -82,7 +87,8 @@ impl Transformed {
 }
 
 /// Tour of the transformed instance's Lin–Kernighan-style search after `trials` kicks, and its
-/// cost; `stop` ends it early.
+/// cost; `stop` is asked before each kick and ends it early. A baseline to compare
+/// [`solve`](crate::solve) with.
 pub fn solve_transformed(
     instance: &Instance,
     trials: u64,

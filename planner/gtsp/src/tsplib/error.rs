@@ -1,4 +1,4 @@
-//! What can be wrong with a file.
+//! What can be wrong with a file or a tour of it.
 
 use std::path::PathBuf;
 
@@ -7,6 +7,7 @@ use crate::tour::TourError;
 
 /// What is wrong with a file, and on which line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TsplibError {
     /// The file cannot be read.
     #[error("cannot read {path}: {reason}")]

@@ -14,6 +14,7 @@ const MOST_NODES: usize = 20_000;
 
 /// An instance with the names that its file uses.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct GtspFile {
     /// `NAME`.
     pub name: String,
@@ -24,20 +25,30 @@ pub struct GtspFile {
 }
 
 /// Reads a `.gtsp` (or `.tsp`, `.atsp`: every node a cluster) file.
-pub fn read_gtsp(path: &Path) -> Result<GtspFile, TsplibError> {
+///
+/// # Errors
+/// Where the file cannot be read, and as [`parse_gtsp`].
+pub fn read_gtsp(path: impl AsRef<Path>) -> Result<GtspFile, TsplibError> {
+    let path = path.as_ref();
     let bytes = std::fs::read(path)
         .map_err(|source| TsplibError::Io { path: path.to_owned(), reason: source.to_string() })?;
     parse_gtsp(&bytes)
 }
 
 /// Parses the bytes of such a file.
+///
+/// # Errors
+/// With the line of what is malformed, missing or not supported.
 pub fn parse_gtsp(bytes: &[u8]) -> Result<GtspFile, TsplibError> {
     let mut parser = Parser { words: Words { rest: bytes, line: 1 }, header: Header::default() };
     parser.run()?;
     parser.header.finish(parser.words.line)
 }
 
-/// Reads the tour section of a tour file: node numbers as the file has them.
+/// Reads the tour section of a tour file: node numbers as the file has them, from 1.
+///
+/// # Errors
+/// Where there is no tour section, or a word in it is no number.
 pub fn parse_tour_numbers(bytes: &[u8]) -> Result<Vec<usize>, TsplibError> {
     let mut words = Words { rest: bytes, line: 1 };
     while let Some(line) = words.take_line() {
@@ -57,6 +68,9 @@ pub fn parse_tour_numbers(bytes: &[u8]) -> Result<Vec<usize>, TsplibError> {
 
 impl GtspFile {
     /// The tour of a tour file of this instance, whose numbers are the chosen nodes in order.
+    ///
+    /// # Errors
+    /// Where the file is malformed or its tour does not fit the instance.
     pub fn parse_tour(&self, bytes: &[u8]) -> Result<Tour, TsplibError> {
         let mut place = vec![None; self.instance.nodes() + 1];
         for (cluster, numbers) in self.node_numbers.iter().enumerate() {
@@ -77,6 +91,9 @@ impl GtspFile {
     }
 
     /// The tour's node numbers in the file.
+    ///
+    /// # Panics
+    /// Where the tour names a node that the instance does not have.
     pub fn tour_numbers(&self, tour: &Tour) -> Vec<usize> {
         tour.clusters.iter().zip(&tour.nodes).map(|(&c, &k)| self.node_numbers[c][k]).collect()
     }

@@ -2,9 +2,11 @@
 
 use proptest::prelude::*;
 
-use super::super::tests::{KINDS, random_instance};
-use super::super::{Budget, Ends, solve, solve_exact, solve_transformed};
 use super::*;
+use crate::tests::{KINDS, random_instance};
+use crate::{
+    Budget, Costs, Ends, Instance, Jump, solve, solve_exact, solve_transformed, transform,
+};
 
 fn file(header: &str, data: &str) -> String {
     format!(
@@ -20,7 +22,7 @@ fn arcs(text: &str) -> (f64, f64) {
 }
 
 #[test]
-fn weight_types() {
+fn every_weight_type_gives_its_distance() {
     let check = |kind: &str, points: [&str; 3], expected: f64| {
         let rows: String =
             points.iter().enumerate().map(|(k, p)| format!("{} {p}\n", k + 1)).collect();
@@ -46,7 +48,7 @@ fn weight_types() {
 }
 
 #[test]
-fn weight_formats() {
+fn every_matrix_format_is_read() {
     let check = |format: &str, numbers: &str, expected: (f64, f64)| {
         let header = format!("EDGE_WEIGHT_TYPE : EXPLICIT\nEDGE_WEIGHT_FORMAT : {format}");
         assert_eq!(
@@ -166,11 +168,11 @@ proptest! {
     fn the_transformation_keeps_small_optima(clusters in 2..5_usize, ends in 0..3_usize, seed: u64) {
         let instance = random_instance(KINDS[1], clusters, 3, ends, seed);
         let (_, optimum) = solve_exact(&instance).expect("small");
-        let transformed = super::super::transform(&instance);
+        let transformed = transform(&instance);
         // Exact optimum of the ATSP: every node is a cluster.
         let n = transformed.nodes;
-        let costs = super::super::Costs::dense(&transformed.matrix);
-        let atsp = super::super::Instance::new(&vec![1; n], costs, super::super::Jump::Forbidden, Ends::Closed)
+        let costs = Costs::Dense(transformed.matrix.iter().map(|&w| w as f64).collect());
+        let atsp = Instance::new(&vec![1; n], costs, Jump::Forbidden, Ends::Closed)
             .expect("fits");
         if let Some((tour, cost)) = solve_exact(&atsp) {
             let expected = optimum.total() * transformed.scale

@@ -8,6 +8,7 @@ use crate::tour::Tour;
 
 /// What the numbers in a written file stand for.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Exported {
     /// Weights in the file are costs × scale, rounded.
     pub scale: f64,
@@ -22,7 +23,11 @@ pub struct Exported {
 const LARGEST: f64 = 1e7;
 
 /// Writes the instance as an AGTSP with a full matrix of integers. Nodes are numbered from 1 in
-/// cluster order; an open path becomes a closed tour with free arcs back to its start.
+/// cluster order; an open path becomes a closed tour with free arcs back to its start. A jump costs
+/// its price.
+///
+/// # Errors
+/// Those of `out`.
 pub fn export(instance: &Instance, name: &str, out: &mut dyn Write) -> io::Result<Exported> {
     let closed = Closed::new(instance);
     let n = closed.nodes.len();
@@ -69,7 +74,10 @@ impl Exported {
     }
 }
 
-/// Writes node numbers as a TSPLIB tour.
+/// Writes node numbers as a TSPLIB tour of this name and value.
+///
+/// # Errors
+/// Those of `out`.
 pub fn write_tour(
     name: &str,
     numbers: &[usize],
