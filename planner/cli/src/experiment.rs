@@ -72,7 +72,7 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
     let spec = ArmSpec::pr2(Side::Right);
     let (patches, graph) = (PatchConfig::default(), GraphConfig::default());
     bars.stage("setting", None);
-    let setting = Setting::new(&robot, &spec, &tool, &surface, &patches, &graph, args.seed)?;
+    let setting = Setting::new(&robot, &spec, &tool, surface, &patches, &graph, args.seed)?;
     let title = match args.scans.first().and_then(|path| path.file_stem()) {
         Some(stem) => format!("Experiment: {}", stem.to_string_lossy()),
         None => format!("Experiment: {}", name(args.object.into())),
