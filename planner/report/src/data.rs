@@ -81,7 +81,7 @@ pub struct Motion {
 #[derive(Debug, Error)]
 pub enum ReportError {
     /// The file could not be written.
-    #[error("{}: the report cannot be written: {source}", path.display())]
+    #[error("{}: the report cannot be written", path.display())]
     Io {
         /// The file.
         path: PathBuf,

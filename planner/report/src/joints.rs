@@ -6,7 +6,7 @@ use plotly::layout::{Axis, HoverMode, Legend, Margin, Shape, ShapeLayer, ShapeLi
 use plotly::{Configuration, Layout, Plot, Scatter};
 
 use crate::data::{JointAxis, Motion, ReportData};
-use crate::scene::{MEASURED, MOTIONS};
+use crate::style::{MEASURED, MOTIONS, escaped};
 
 /// Joints in one figure: as many as a layout has axes.
 pub(super) const ROWS: usize = 8;
@@ -93,8 +93,8 @@ fn curve(plot: &mut Plot, motion: &Motion, joint: usize, row: usize, line: Line)
     let values = kept.iter().map(|&i| rounded(positions[i])).collect();
     plot.add_trace(
         Scatter::new(times, values)
-            .name(super::page::escaped(&motion.name))
-            .legend_group(super::page::escaped(&motion.name))
+            .name(escaped(&motion.name))
+            .legend_group(escaped(&motion.name))
             .show_legend(row == 0)
             .mode(Mode::Lines)
             .line(line)
@@ -184,7 +184,7 @@ fn axis_name(letter: &str, index: usize) -> String {
 /// A joint's name in the room of an axis title.
 fn short(name: &str) -> String {
     let name = name.strip_suffix("_joint").unwrap_or(name);
-    format!("{}<br>[rad]", super::page::escaped(&name.replace('_', " ")))
+    format!("{}<br>[rad]", escaped(&name.replace('_', " ")))
 }
 
 fn rounded(value: f64) -> f64 {

@@ -6,6 +6,7 @@ use std::path::Path;
 use plotly::Plot;
 
 use crate::data::{ReportData, ReportError, Table};
+use crate::style::escaped;
 use crate::{joints, scene};
 
 /// Height of one joint's curve. \[px\]
@@ -60,7 +61,7 @@ pub fn render(data: &ReportData) -> Result<String, ReportError> {
         "<h2>Surface and tool path</h2>\n<p class=\"note\">Drag to turn, scroll to zoom; a click \
          on the legend hides or shows (the graph is hidden at first). Thick lines are contact, \
          dotted ones transfers through the air, diamonds the starts. Red squares are patches that \
-         cannot be reached; point at one for the reason. Marks and ways are drawn 6 mm off the \
+         cannot be reached; point at one for the reason. Marks and paths are drawn 6 mm off the \
          surface, or the scan would hide them.</p>\n",
     );
     push_plot(&mut page, &scene::plot(data), "scene", "height: 78vh; min-height: 480px");
@@ -77,11 +78,6 @@ pub fn render(data: &ReportData) -> Result<String, ReportError> {
     }
     page.push_str("</body>\n</html>\n");
     Ok(page)
-}
-
-/// Text as it may stand in HTML.
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// The plotting library alone: its sources come with a formula typesetter of 2 MB behind it, which

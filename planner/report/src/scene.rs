@@ -9,6 +9,7 @@ use plotly::layout::{
 use plotly::{Configuration, Layout, Plot, Scatter3D};
 
 use crate::data::{Motion, PatchMark, ReportData};
+use crate::style::{MEASURED, MOTIONS, escaped};
 
 /// Most scan points shown; more neither show more nor load well.
 const MAX_POINTS: usize = 15_000;
@@ -19,7 +20,7 @@ const MAX_PATH: usize = 8_000;
 /// Length of a patch's normal. \[m\]
 const NORMAL: f64 = 0.02;
 
-/// How far patches and ways are drawn off the surface, so that the scan does not hide them. \[m\]
+/// How far patches and paths are drawn off the surface, so that the scan does not hide them. \[m\]
 const LIFT: f64 = 0.006;
 
 /// Colours that stay apart for the colour-blind (after Okabe & Ito).
@@ -27,13 +28,8 @@ const SWEPT: &str = "#7fb8ad";
 const UNSWEPT: &str = "#e69f00";
 const REACHABLE: &str = "#0072b2";
 const UNREACHABLE: &str = "#d1350f";
-/// For the motions, in turn: in contact, and in transfer.
-pub(super) const MOTIONS: [(&str, &str); 3] =
-    [("#12307a", "#8c9fd6"), ("#a3246e", "#e2a0c8"), ("#2b7a1f", "#a5d69c")];
-/// For measured motions, in turn.
-pub(super) const MEASURED: [&str; 2] = ["#111111", "#7a5c00"];
 
-/// The scan, the patches, the graph and the tool's ways.
+/// The scan, the patches, the graph and the tool's paths.
 pub(super) fn plot(data: &ReportData) -> Plot {
     let mut plot = Plot::new();
     scan(&mut plot, data);
@@ -120,7 +116,7 @@ fn patches(plot: &mut Plot, patches: &[PatchMark]) {
             .iter()
             .map(|(i, patch)| match &patch.unreachable {
                 None => format!("patch {i}"),
-                Some(reason) => format!("patch {i}: {}", super::page::escaped(reason)),
+                Some(reason) => format!("patch {i}: {}", escaped(reason)),
             })
             .collect();
         plot.add_trace(
@@ -151,7 +147,7 @@ fn lifted(patch: &PatchMark) -> Point3<f64> {
     patch.centre + patch.normal.scale(LIFT)
 }
 
-/// A motion's way: contact solid, transfers (if they have a colour) dotted, its start marked.
+/// A motion's path: contact solid, transfers (if they have a colour) dotted, its start marked.
 fn path(
     plot: &mut Plot,
     patches: &[PatchMark],
@@ -175,7 +171,7 @@ fn path(
         let nearest = patches.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         nearest.map_or(motion.tool[i], |patch| motion.tool[i] + patch.normal.scale(LIFT))
     };
-    // A piece of way is contact if both its ends are; each run is closed by a gap.
+    // A piece of the path is contact if both its ends are; each run is closed by a gap.
     let run = |wanted: bool| {
         let mut points = Vec::new();
         for pair in kept.windows(2) {
@@ -262,6 +258,6 @@ impl Cloud {
         name: &str,
         mode: Mode,
     ) -> Box<Scatter3D<Option<f64>, Option<f64>, Option<f64>>> {
-        Scatter3D::new(self.x, self.y, self.z).name(super::page::escaped(name)).mode(mode)
+        Scatter3D::new(self.x, self.y, self.z).name(escaped(name)).mode(mode)
     }
 }
