@@ -5,8 +5,7 @@
 //! enough, and go on until every point was taken or drawn.
 //!
 //! Points that end up in no patch (slivers between patches, isolated or strongly curved spots)
-//! stay in none: the coverage is measured over all points of the scan, so they count, and
-//! [`owners`] says which patch is nearest for those who want to show them.
+//! stay in none: the coverage is measured over all points of the scan, so they count.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use rand::seq::SliceRandom;
@@ -158,26 +157,6 @@ pub fn find(scan: &Scan, config: &PatchConfig, seed: u64) -> Vec<Patch> {
         }
     }
     patches
-}
-
-/// For each point of the scan the patch that holds it, else the nearest patch by its centre within
-/// `reach`, else `None`.
-#[must_use]
-pub fn owners(scan: &Scan, patches: &[Patch], reach: f64) -> Vec<Option<u32>> {
-    let mut owners = vec![None; scan.points.len()];
-    for (index, patch) in patches.iter().enumerate() {
-        for &point in &patch.points {
-            owners[point as usize] = Some(index as u32);
-        }
-    }
-    let centres: Vec<Point3<f64>> = patches.iter().map(|patch| patch.centre).collect();
-    let grid = Grid::new(&centres, reach);
-    for (owner, point) in owners.iter_mut().zip(&scan.points) {
-        if owner.is_none() {
-            *owner = grid.nearest(point, reach, |_| true).map(|(index, _)| index);
-        }
-    }
-    owners
 }
 
 /// The points that a full neighbourhood of the radius holds: the median over the scan, as borders
