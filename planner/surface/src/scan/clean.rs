@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, HashMap};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use rayon::prelude::*;
 
+use super::cloud::{MIN_POINTS, Scan};
 use super::error::ScanError;
+use super::normals;
 use super::place::PlacedScan;
-use super::read::MIN_POINTS;
-use super::{Scan, normals};
 use crate::fit::{HeightFit, weight};
 use crate::grid::Grid;
 
@@ -72,7 +72,7 @@ const EDGE_ANGLE: f64 = 0.45;
 /// Cleans views into one scan: points of each view are merged by voxels, outliers dropped, normals
 /// estimated within each view and oriented (to the normals of the file, else to the sensor, else
 /// outwards), then all points are smoothed on all views by a moving least squares fit that weighs
-/// neighbours by distance and by agreement of normals.
+/// neighbours by distance and by agreement of normals (as Öztireli, Guennebaud & Gross 2009).
 ///
 /// # Errors
 /// [`ScanError::NoSurface`] when fewer than 15 points are left.
@@ -182,7 +182,8 @@ fn merge(samples: &mut Vec<Sample>, voxel: f64, max_points: usize) -> f64 {
     }
 }
 
-/// Drops points that lie apart from the others.
+/// Drops points that lie apart from the others: whose mean distance to their neighbours stands out
+/// (Rusu, Marton, Blodow, Dolha & Beetz 2008).
 fn drop_outliers(samples: &mut Vec<Sample>, config: &CleanConfig) {
     let points = positions(samples);
     if points.len() <= config.outlier_neighbours {

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::crop::CropBox;
+
 /// Why a scan was refused.
 #[derive(Debug, Error)]
 pub enum ScanError {
     /// The file could not be opened or read.
-    #[error("{}: cannot be read: {source}", path.display())]
+    #[error("{}: cannot be read", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -57,10 +59,14 @@ pub enum ScanError {
     },
     /// Nothing is left after the crop.
     #[error(
-        "the crop box keeps none of {points} points, which span {min:.3?} to {max:.3?} m in the \
-         floor frame; widen the box or check the placement"
+        "the box from {:.3?} to {:.3?} m holds none of {points} points, which span {min:.3?} to \
+         {max:.3?} m in the floor frame",
+        <[f64; 3]>::from(region.min),
+        <[f64; 3]>::from(region.max)
     )]
     EmptyCrop {
+        /// The box.
+        region: CropBox,
         /// Points before the crop.
         points: usize,
         /// Least corner of the placed scan. \[m\]
@@ -71,8 +77,7 @@ pub enum ScanError {
     /// Cleaning left too little to plan on.
     #[error(
         "{left} of {points} points are left after cleaning, {needed} are needed: the points form \
-         no surface at the scale of {radius:.3} m (too sparse, one line, or a wrong unit; see \
-         the scale option)"
+         no surface at the scale of {radius:.3} m (too sparse, one line, or not in metres)"
     )]
     NoSurface {
         /// Points before cleaning.
@@ -109,7 +114,7 @@ impl fmt::Display for Place {
 pub enum ScanWarning {
     /// The extent suggests that the file is not in metres.
     LooksLikeMillimetres {
-        /// Longest side of the bounding box, in the file's unit.
+        /// Longest side of the bounding box. \[m\]
         extent: f64,
     },
     /// Points were dropped as NaN or infinite; depth cameras mark missing pixels so.
@@ -132,10 +137,9 @@ pub enum ScanWarning {
 impl fmt::Display for ScanWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::LooksLikeMillimetres { extent } => write!(
-                f,
-                "the points span {extent:.0} units, which looks like millimetres: use a scale of 0.001"
-            ),
+            Self::LooksLikeMillimetres { extent } => {
+                write!(f, "the points span {extent:.0} m: are they in millimetres?")
+            }
             Self::NonFinite { dropped } => {
                 write!(f, "{dropped} points dropped as not finite (pixels without depth)")
             }

@@ -1,71 +1,12 @@
-//! STL and OBJ meshes, and sampling any mesh into points.
+//! STL and OBJ meshes.
 
 use std::collections::HashMap;
 
-use nalgebra::{Point3, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use nalgebra::Point3;
 
-use super::error::{Malformed, Place, ScanWarning, malformed};
-use super::read::{Parsed, ReadOptions};
+use super::error::{Malformed, Place, malformed};
+use super::parsed::Parsed;
 use super::text::{as_text, without_bom};
-
-/// Most points sampled on one mesh; cleaning keeps a fifth of them.
-const MAX_SAMPLES: f64 = 300_000.0;
-
-/// Points with normals, spread evenly at random over the faces: `1 / spacing²` for each square
-/// metre. Returns also how many faces were dropped as not finite.
-pub(super) fn sample(
-    vertices: &[Point3<f64>],
-    triangles: &[[usize; 3]],
-    options: &ReadOptions,
-    warnings: &mut Vec<ScanWarning>,
-) -> (Vec<Point3<f64>>, Vec<Vector3<f64>>, usize) {
-    let mut faces = Vec::with_capacity(triangles.len());
-    let mut cumulative = Vec::with_capacity(triangles.len());
-    let mut area = 0.0;
-    let mut dropped = 0;
-    for corners in triangles {
-        let [a, b, c] = corners.map(|corner| vertices[corner]);
-        let twice = (b - a).cross(&(c - a));
-        let norm = twice.norm();
-        if !norm.is_finite() {
-            dropped += 1;
-        } else if norm > 0.0 {
-            area += 0.5 * norm;
-            faces.push((a, b - a, c - a, twice / norm));
-            cumulative.push(area);
-        }
-    }
-    if !area.is_finite() || area <= 0.0 {
-        return (Vec::new(), Vec::new(), dropped);
-    }
-    let mut wanted = area / options.mesh_spacing.powi(2);
-    if wanted > MAX_SAMPLES {
-        wanted = MAX_SAMPLES;
-        warnings.push(ScanWarning::SpacingWidened { spacing: (area / wanted).sqrt() });
-    }
-    let count = wanted.ceil() as usize;
-    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-    let mut points = Vec::with_capacity(count);
-    let mut normals = Vec::with_capacity(count);
-    let mut face = 0;
-    for i in 0..count {
-        // One sample in each of `count` equal strata of the area: more even than drawing faces.
-        let at = (i as f64 + rng.random::<f64>()) / count as f64 * area;
-        while face + 1 < faces.len() && cumulative[face] < at {
-            face += 1;
-        }
-        let (origin, u, v, normal) = faces[face];
-        let (mut s, mut t) = (rng.random::<f64>(), rng.random::<f64>());
-        if s + t > 1.0 {
-            (s, t) = (1.0 - s, 1.0 - t);
-        }
-        points.push(origin + u * s + v * t);
-        normals.push(normal);
-    }
-    (points, normals, dropped)
-}
 
 /// Reads an STL mesh, ascii or binary.
 pub(super) fn parse_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
@@ -105,7 +46,7 @@ fn parse_ascii_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let mut corners = Vec::with_capacity(3);
     let mut closed = false;
     let mut line = 0;
-    for text in as_text(without_bom(bytes))?.lines() {
+    for text in as_text(bytes)?.lines() {
         line += 1;
         let mut tokens = text.split_ascii_whitespace();
         match tokens.next() {
@@ -134,7 +75,7 @@ fn parse_ascii_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
 pub(super) fn parse_obj(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let mut parsed = Parsed::default();
     let mut corners = Vec::new();
-    for (index, text) in as_text(without_bom(bytes))?.lines().enumerate() {
+    for (index, text) in as_text(bytes)?.lines().enumerate() {
         let place = Place::Line(index + 1);
         let mut tokens = text.split_ascii_whitespace();
         match tokens.next() {
@@ -178,9 +119,9 @@ fn numbers<'a>(
     place: Place,
 ) -> Result<[f64; 3], Malformed> {
     let mut values = [0.0; 3];
-    for value in &mut values {
+    for (i, value) in values.iter_mut().enumerate() {
         let Some(token) = tokens.next() else {
-            return malformed(place, "a vertex needs three numbers");
+            return malformed(place, format!("a vertex of {i} numbers where three are needed"));
         };
         *value =
             token.parse().or_else(|_| malformed(place, format!("{token:?} is not a number")))?;
@@ -211,9 +152,10 @@ impl Soup {
 mod tests {
     use std::path::Path;
 
-    use super::super::ScanError;
-    use super::super::read::{Format, RawScan, read_bytes};
-    use super::*;
+    use nalgebra::Vector3;
+
+    use super::super::sample::MAX_SAMPLES;
+    use super::super::{Format, RawScan, ReadOptions, ScanError, ScanWarning, read_bytes};
 
     /// The corners and outward triangles of a box of 0.3 × 0.2 × 0.1 m.
     fn brick() -> (Vec<[f32; 3]>, Vec<[usize; 3]>) {

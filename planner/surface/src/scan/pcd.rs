@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{Malformed, Place, ScanWarning, malformed};
-use super::read::Parsed;
+use super::parsed::Parsed;
 use super::text::without_bom;
 
 /// Longest header that is looked for. \[byte\]
@@ -103,7 +103,7 @@ impl Header {
                 return malformed(Place::Line(line), cause);
             };
             let text = std::str::from_utf8(&rest[..end])
-                .or_else(|_| malformed(Place::Line(line), "the header is not text"))?;
+                .or_else(|_| malformed(Place::Line(line), "the header is not text (UTF-8)"))?;
             offset += end + 1;
             let mut tokens =
                 text.split('#').next().unwrap_or("").split_ascii_whitespace().map(str::to_owned);
@@ -200,7 +200,11 @@ impl Header {
         let Ok((place, tokens)) = entries.get("VIEWPOINT") else { return Ok(None) };
         let values: Vec<f64> = tokens.iter().filter_map(|t| t.parse().ok()).collect();
         let [tx, ty, tz, qw, qx, qy, qz] = values[..] else {
-            return malformed(place, "VIEWPOINT needs seven numbers: tx ty tz qw qx qy qz");
+            let cause = format!(
+                "VIEWPOINT {} is not seven numbers: tx ty tz qw qx qy qz",
+                tokens.join(" ")
+            );
+            return malformed(place, cause);
         };
         let rotation = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6);
         match rotation {
@@ -208,7 +212,7 @@ impl Header {
                 let pose = Isometry3::from_parts(Translation3::new(tx, ty, tz), rotation);
                 Ok((pose != Isometry3::identity()).then_some(pose))
             }
-            _ => malformed(place, "VIEWPOINT is no pose"),
+            _ => malformed(place, format!("VIEWPOINT {} is no pose", tokens.join(" "))),
         }
     }
 }
@@ -230,7 +234,7 @@ impl Entries {
         let (place, values) = self.get(key)?;
         match values {
             [value] => Ok((place, value.clone())),
-            _ => malformed(place, format!("{key} needs one value")),
+            _ => malformed(place, format!("{key} has {} values, one is needed", values.len())),
         }
     }
 
@@ -264,7 +268,9 @@ fn ascii(bytes: &[u8], header: &Header, parsed: &mut Parsed) -> Result<(), Malfo
     for text in bytes[header.body..].split(|&b| b == b'\n') {
         line += 1;
         let place = Place::Line(line);
-        let text = std::str::from_utf8(text).or_else(|_| malformed(place, "not text"))?;
+        let text = std::str::from_utf8(text).or_else(|e| {
+            malformed(place, format!("0x{:02x} is not text (UTF-8)", text[e.valid_up_to()]))
+        })?;
         let mut tokens = text.split_ascii_whitespace().peekable();
         if tokens.peek().is_none() {
             continue;

@@ -2,8 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 
+use super::crop::CropBox;
 use super::error::ScanError;
-use super::read::RawScan;
+use super::raw::RawScan;
 
 /// What is known about where a scan was taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,48 +131,12 @@ impl PlacedScan {
         for point in self.views.iter().flat_map(|view| &view.points) {
             (min, max) = (min.inf(&point.coords), max.sup(&point.coords));
         }
-        Err(ScanError::EmptyCrop { points: self.len(), min: min.into(), max: max.into() })
-    }
-}
-
-/// An axis-aligned box, bounds included.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CropBox {
-    /// Least corner. \[m\]
-    pub min: Point3<f64>,
-    /// Greatest corner. \[m\]
-    pub max: Point3<f64>,
-}
-
-impl CropBox {
-    /// Whether the box holds a point.
-    #[must_use]
-    pub fn contains(&self, point: &Point3<f64>) -> bool {
-        (0..3).all(|axis| self.min[axis] <= point[axis] && point[axis] <= self.max[axis])
-    }
-}
-
-impl std::str::FromStr for CropBox {
-    type Err = String;
-
-    /// Parses `xmin,ymin,zmin,xmax,ymax,zmax`.
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let values: Vec<f64> = text
-            .split(',')
-            .map(|v| v.trim().parse().map_err(|_| format!("{v:?} is not a number")))
-            .collect::<Result<_, _>>()?;
-        let [a, b, c, d, e, f] = values[..] else {
-            return Err(format!(
-                "{} numbers where xmin,ymin,zmin,xmax,ymax,zmax is needed",
-                values.len()
-            ));
-        };
-        let region = Self { min: Point3::new(a, b, c), max: Point3::new(d, e, f) };
-        if (0..3).all(|axis| region.min[axis] < region.max[axis]) {
-            Ok(region)
-        } else {
-            Err("each minimum must lie below its maximum".into())
-        }
+        Err(ScanError::EmptyCrop {
+            region: *region,
+            points: self.len(),
+            min: min.into(),
+            max: max.into(),
+        })
     }
 }
 
@@ -244,14 +209,5 @@ mod tests {
         let (_, pose) = place(&scan, &placement);
         let again = place(&scan, &Placement::Frame { pose, sensor: None }).0;
         assert_eq!(again, placed);
-    }
-
-    #[test]
-    fn a_crop_box_reads_and_refuses() {
-        let region: CropBox = "-1,-1,0.3,1,1,0.6".parse().unwrap();
-        assert!(region.contains(&Point3::new(0.0, 0.0, 0.3)));
-        assert!(!region.contains(&Point3::new(0.0, 0.0, 0.61)));
-        assert!("0,0,0,1,1".parse::<CropBox>().is_err());
-        assert!("0,0,0,1,1,0".parse::<CropBox>().is_err());
     }
 }

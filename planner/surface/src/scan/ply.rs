@@ -10,7 +10,7 @@ use ply_rs_bw::ply::{
 };
 
 use super::error::{Malformed, Place, malformed};
-use super::read::Parsed;
+use super::parsed::Parsed;
 use super::text::without_bom;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {

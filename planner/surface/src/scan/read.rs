@@ -2,28 +2,13 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3};
 
+use super::cloud::MIN_POINTS;
 use super::error::{Malformed, ScanError, ScanWarning};
-use super::{mesh, pcd, ply, text};
-
-/// Points as the file holds them: finite, scaled to metres, in the file's own frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RawScan {
-    /// The finite points. \[m\]
-    pub points: Vec<Point3<f64>>,
-    /// Unit normals parallel to `points`, where the file has a usable one for every point.
-    pub normals: Option<Vec<UnitVector3<f64>>>,
-    /// Pose of the sensor in the frame of the points, where a PCD header states other than the
-    /// identity that every writer fills in. Advisory: files exist whose header turns points that
-    /// are already in the optical frame, so it is applied only on request
-    /// ([`super::Placement::Viewpoint`]).
-    pub viewpoint: Option<Isometry3<f64>>,
-    /// Points dropped as NaN or infinite.
-    pub dropped: usize,
-    /// What the user should know.
-    pub warnings: Vec<ScanWarning>,
-}
+use super::parsed::Parsed;
+use super::raw::RawScan;
+use super::{mesh, pcd, ply, sample, text};
 
 /// How to read a scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,9 +67,6 @@ impl Format {
     }
 }
 
-/// The fewest points of which a surface can be made.
-pub(super) const MIN_POINTS: usize = 15;
-
 /// Longest plausible side of a scan in metres; beyond it the unit is taken for millimetres.
 const METRE_EXTENT: f64 = 30.0;
 
@@ -125,19 +107,6 @@ pub fn read_bytes(
     finish(parsed, path, options)
 }
 
-/// What a parser hands over: everything in the file's unit, nothing filtered.
-#[derive(Debug, Default)]
-pub(super) struct Parsed {
-    /// Points, or the vertices of a mesh.
-    pub(super) points: Vec<Point3<f64>>,
-    /// Parallel to `points`, or empty.
-    pub(super) normals: Vec<Vector3<f64>>,
-    /// Corners as indices into `points`; not empty: a mesh.
-    pub(super) triangles: Vec<[usize; 3]>,
-    pub(super) viewpoint: Option<Isometry3<f64>>,
-    pub(super) warnings: Vec<ScanWarning>,
-}
-
 fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan, ScanError> {
     let Parsed { mut points, mut normals, triangles, mut viewpoint, mut warnings } = parsed;
     for p in &mut points {
@@ -148,7 +117,8 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     }
     let mut dropped = 0;
     if !triangles.is_empty() {
-        (points, normals, dropped) = mesh::sample(&points, &triangles, options, &mut warnings);
+        (points, normals, dropped) =
+            sample::sample(&points, &triangles, options.mesh_spacing, options.seed, &mut warnings);
     }
     let finite: Vec<bool> = points.iter().map(|p| p.coords.iter().all(|c| c.is_finite())).collect();
     let kept_normals: Vec<Option<UnitVector3<f64>>> = normals

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 
-use super::Scan;
 use super::clean::{CleanConfig, CleanReport, clean};
+use super::cloud::{MIN_POINTS, Scan};
+use super::crop::CropBox;
 use super::error::ScanError;
-use super::place::{CropBox, PlacedScan};
+use super::place::PlacedScan;
 
 /// Side of the cubes to which the surroundings are thinned. \[m\]
 const SURROUNDINGS_VOXEL: f64 = 0.02;
@@ -43,11 +44,11 @@ pub fn clean_region(
     let grown = CropBox { min: region.min - margin, max: region.max + margin };
     let (whole, report) = clean(&scan.crop(&grown)?, config)?;
     let surface = whole.cropped(region);
-    if surface.points.len() < super::read::MIN_POINTS {
+    if surface.points.len() < MIN_POINTS {
         return Err(ScanError::NoSurface {
             points: scan.len(),
             left: surface.points.len(),
-            needed: super::read::MIN_POINTS,
+            needed: MIN_POINTS,
             radius: report.radius,
         });
     }

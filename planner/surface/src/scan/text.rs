@@ -3,23 +3,28 @@
 use nalgebra::{Point3, Vector3};
 
 use super::error::{Malformed, Place, malformed};
-use super::read::Parsed;
+use super::parsed::Parsed;
 
 /// Bytes without a leading UTF-8 byte-order mark.
 pub(super) fn without_bom(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
-/// The content as text, or where it stops being text.
+/// The content as text without a byte-order mark, or where it stops being text.
 pub(super) fn as_text(bytes: &[u8]) -> Result<&str, Malformed> {
-    std::str::from_utf8(bytes).or_else(|e| malformed(Place::Byte(e.valid_up_to()), "not text"))
+    let content = without_bom(bytes);
+    std::str::from_utf8(content).or_else(|e| {
+        let value = content[e.valid_up_to()];
+        let at = bytes.len() - content.len() + e.valid_up_to();
+        malformed(Place::Byte(at), format!("0x{value:02x} is not text (UTF-8)"))
+    })
 }
 
 /// Lines of comments (`#`, `//`) and one leading line of column names are passed over. With six or
 /// more columns named `nx ny nz` in a header, or exactly six columns without a header, the last
 /// three are normals; further columns are ignored.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
-    let content = as_text(without_bom(bytes))?;
+    let content = as_text(bytes)?;
     let mut parsed = Parsed::default();
     let mut columns: Option<Columns> = None;
     for (index, line) in content.lines().enumerate() {

@@ -5,27 +5,37 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::{Shape, SimulatedView};
+use super::shape::Shape;
 use crate::scan::RawScan;
+
+/// One view of a simulated object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedView {
+    /// The points in the optical frame (x right, y down, z forward), without the floor.
+    pub scan: RawScan,
+    /// The optical frame in the floor frame: z up, the object standing at the origin, its front
+    /// towards −x, where the sensor stands.
+    pub sensor_pose: Isometry3<f64>,
+}
 
 /// A structured-light camera with the noise of a Kinect: σ(z) = 1.2 mm + 1.9 mm/m² (z − 0.4 m)²
 /// along the optical axis (Nguyen, Izadi & Lovell 2012).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Kinect {
+pub(super) struct Kinect {
     /// Pixels in a row.
-    pub width: usize,
+    width: usize,
     /// Pixels in a column.
-    pub height: usize,
+    height: usize,
     /// Horizontal field of view. \[rad\]
-    pub horizontal_view: f64,
+    horizontal_view: f64,
     /// Vertical field of view. \[rad\]
-    pub vertical_view: f64,
+    vertical_view: f64,
     /// Least and greatest depth that is measured. \[m\]
-    pub range: (f64, f64),
+    range: (f64, f64),
     /// Least cosine between surface normal and ray that still returns a depth.
-    pub grazing_cosine: f64,
+    grazing_cosine: f64,
     /// Points lower than this count as floor and are removed. \[m\]
-    pub floor_clearance: f64,
+    floor_clearance: f64,
 }
 
 impl Default for Kinect {
@@ -44,8 +54,7 @@ impl Default for Kinect {
 
 impl Kinect {
     /// The noise of one depth. \[m\]
-    #[must_use]
-    pub fn noise(depth: f64) -> f64 {
+    fn noise(depth: f64) -> f64 {
         0.0012 + 0.0019 * (depth - 0.4).powi(2)
     }
 

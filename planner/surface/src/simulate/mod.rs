@@ -7,22 +7,12 @@
 mod camera;
 mod shape;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 
-pub use camera::Kinect;
+pub use camera::SimulatedView;
 
-use crate::scan::{CropBox, RawScan};
-use shape::Shape;
-
-/// One view of a simulated object.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SimulatedView {
-    /// The points in the optical frame (x right, y down, z forward), without the floor.
-    pub scan: RawScan,
-    /// The optical frame in the floor frame: z up, the object standing at the origin, its front
-    /// towards −x, where the sensor stands.
-    pub sensor_pose: Isometry3<f64>,
-}
+use crate::scan::CropBox;
+use camera::Kinect;
 
 /// Height of the sensor above the floor. \[m\]
 const SENSOR_HEIGHT: f64 = 1.35;

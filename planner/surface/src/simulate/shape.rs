@@ -1,4 +1,5 @@
-//! Solids by their distance fields, which blend into rounded bodies and trace quickly.
+//! Solids by their distance fields, which blend into rounded bodies and trace quickly (Hart, Sphere
+//! tracing, 1996).
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 

@@ -1,0 +1,18 @@
+//! What the parsers of all formats have in common: the form of their result.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::error::ScanWarning;
+
+/// What a parser hands over: everything in the file's unit, nothing filtered.
+#[derive(Debug, Default)]
+pub(super) struct Parsed {
+    /// Points, or the vertices of a mesh.
+    pub(super) points: Vec<Point3<f64>>,
+    /// Parallel to `points`, or empty.
+    pub(super) normals: Vec<Vector3<f64>>,
+    /// Corners as indices into `points`; not empty: a mesh.
+    pub(super) triangles: Vec<[usize; 3]>,
+    pub(super) viewpoint: Option<Isometry3<f64>>,
+    pub(super) warnings: Vec<ScanWarning>,
+}

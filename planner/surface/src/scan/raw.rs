@@ -1,0 +1,23 @@
+//! A scan as its file holds it.
+
+use nalgebra::{Isometry3, Point3, UnitVector3};
+
+use super::error::ScanWarning;
+
+/// Points as the file holds them: finite, scaled to metres, in the file's own frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawScan {
+    /// The finite points. \[m\]
+    pub points: Vec<Point3<f64>>,
+    /// Unit normals parallel to `points`, where the file has a usable one for every point.
+    pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// Pose of the sensor in the frame of the points, where a PCD header states other than the
+    /// identity that every writer fills in. Advisory: files exist whose header turns points that
+    /// are already in the optical frame, so it is applied only on request
+    /// (`Placement::Viewpoint`).
+    pub viewpoint: Option<Isometry3<f64>>,
+    /// Points dropped as NaN or infinite.
+    pub dropped: usize,
+    /// What the user should know.
+    pub warnings: Vec<ScanWarning>,
+}
