@@ -1,9 +1,15 @@
 //! Local surface fits: the arithmetic shared by cleaning and the surface model.
+//!
+//! Planes by principal components (Hoppe, DeRose, Duchamp, McDonald & Stuetzle, Surface
+//! reconstruction from unorganized points, 1992) and heights over a plane by moving least squares
+//! (Alexa, Behr, Cohen-Or, Fleishman, Levin & Silva, Computing and rendering point set surfaces,
+//! 2003).
 
 use nalgebra::{Matrix3, Matrix4, Point3, SymmetricEigen, UnitVector3, Vector3, Vector4};
 
-/// Weight of a neighbour by its squared distance as a fraction of the squared radius: smooth, and
-/// zero with zero slope at the radius, so that a fit varies smoothly as its centre moves.
+/// Weight of a neighbour by its squared distance as a fraction of the squared radius: (1 − d²/r²)²,
+/// Tukey's biweight. Smooth, and zero with zero slope at the radius, so that a fit varies smoothly
+/// as its centre moves.
 pub(crate) fn weight(squared_fraction: f64) -> f64 {
     let rest = (1.0 - squared_fraction).max(0.0);
     rest * rest
@@ -60,7 +66,8 @@ impl PlaneFit {
 /// A weighted fit of the height h = a + b u + c v + d (u² + v²) over a tangent plane.
 ///
 /// The last term takes up the surface's mean curvature; a plane alone would lie inside a curved
-/// surface by about half the curvature times the variance of the neighbourhood.
+/// surface by about half the curvature times the variance of the neighbourhood. A full quadric has
+/// two terms more, which few and noisy neighbours do not determine.
 #[derive(Clone, Debug)]
 pub(crate) struct HeightFit {
     origin: Point3<f64>,

@@ -2,7 +2,9 @@
 //!
 //! Two patch centres 5–10 cm apart on a curved body span a chord that runs 4–13 mm inside it.
 //! [`Surface::line`] lays that chord onto the surface. The surface is a moving least squares fit
-//! whose weights fade out smoothly, so that points and normals along a line vary smoothly.
+//! whose weights fade out smoothly, so that points and normals along a line vary smoothly: the point
+//! set surface of Alexa et al. (2003, see `fit`), with neighbours on the back of a thin wall left out
+//! by their normals.
 
 use std::f64::consts::PI;
 
@@ -154,7 +156,7 @@ impl Surface {
         line[0] = *a;
         let last = line.len() - 1;
         line[last] = *b;
-        calm(&mut line, wave)?;
+        low_pass(&mut line, wave)?;
         Some(line)
     }
 
@@ -238,7 +240,7 @@ impl Surface {
 }
 
 /// Median distance of points from the surface fitted to their neighbours, as the standard deviation
-/// of normal noise. \[m\]
+/// of normal noise, which is 1.48 medians. \[m\]
 fn noise(grid: &Grid, points: &[Point3<f64>], normals: &[UnitVector3<f64>], radius: f64) -> f64 {
     let step = (points.len() / NOISE_SAMPLES).max(1);
     let mut off: Vec<f64> = (0..points.len())
@@ -260,24 +262,24 @@ fn noise(grid: &Grid, points: &[Point3<f64>], normals: &[UnitVector3<f64>], radi
     1.48 * off.get(off.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Takes tremble out of the normals between a line's ends: of their deviation from the blend of the
+/// Low-pass filters the normals between a line's ends: of their deviation from the blend of the
 /// ends' normals only sine waves over the length are kept that are at least `shortest` long. An arm
-/// would follow every tremble with all its joints. `None` where a normal vanishes.
-fn calm(line: &mut [SurfacePoint], shortest: f64) -> Option<()> {
-    let mut way = vec![0.0];
+/// would follow every ripple with all its joints. `None` where a normal vanishes.
+fn low_pass(line: &mut [SurfacePoint], shortest: f64) -> Option<()> {
+    let mut arc = vec![0.0];
     for pair in line.windows(2) {
-        way.push(way[way.len() - 1] + (pair[1].point - pair[0].point).norm());
+        arc.push(arc[arc.len() - 1] + (pair[1].point - pair[0].point).norm());
     }
-    let (last, length) = (line.len() - 1, way[way.len() - 1]);
+    let (last, length) = (line.len() - 1, arc[arc.len() - 1]);
     let ends = [*line[0].normal, *line[last].normal];
-    let straight = |i: usize| ends[0].lerp(&ends[1], way[i] / length);
-    let wave = |m: usize, i: usize| (PI * m as f64 * way[i] / length).sin();
+    let straight = |i: usize| ends[0].lerp(&ends[1], arc[i] / length);
+    let wave = |m: usize, i: usize| (PI * m as f64 * arc[i] / length).sin();
     let off: Vec<Vector3<f64>> = (0..=last).map(|i| *line[i].normal - straight(i)).collect();
     // More waves than half the points are not there to be told apart.
     let count = ((2.0 * length / shortest) as usize).min(last / 2);
     // By the trapezoid rule, with waves and deviations that vanish at both ends.
     let amplitude = |m: usize| -> Vector3<f64> {
-        (1..last).map(|i| off[i] * (wave(m, i) * (way[i + 1] - way[i - 1]) / length)).sum()
+        (1..last).map(|i| off[i] * (wave(m, i) * (arc[i + 1] - arc[i - 1]) / length)).sum()
     };
     let kept: Vec<(usize, Vector3<f64>)> = (1..=count).map(|m| (m, amplitude(m))).collect();
     for i in 1..last {
