@@ -10,8 +10,7 @@ use nullsweep_collision::{Obstacle, Options, World};
 use nullsweep_planner::roadmap::{Edge, ToolPath};
 use nullsweep_planner::workcell::{Sample, Workcell, contact_pose, direction, heading_of};
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
-use nullsweep_surface::scan::Scan;
-use nullsweep_surface::sheet::{Surface, SurfacePoint};
+use nullsweep_surface::{Scan, Surface, SurfacePoint};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -8,8 +8,7 @@ use nullsweep_planner::progress::Silent;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_robot::{ArmSpec, Robot, Tool};
-use nullsweep_surface::scan::{CleanConfig, Placement, clean_region, place};
-use nullsweep_surface::simulate;
+use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
 
 /// An arm in the manner of industrial ones: shoulder and elbow parallel, a spherical wrist, the
 /// flange's x axis ahead.

@@ -9,7 +9,7 @@ use nullsweep_collision::{Obstacle, ObstacleShape, Options, ToolContact, World};
 use nullsweep_planner::roadmap::{Edge, ToolPath, Track, TrackFailure};
 use nullsweep_planner::workcell::{Sample, Workcell, contact_pose, direction, heading_of};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, RedundantJoint, Robot, Side, Solutions, Tool};
-use nullsweep_surface::sheet::SurfacePoint;
+use nullsweep_surface::SurfacePoint;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

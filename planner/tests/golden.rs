@@ -15,8 +15,9 @@ use nullsweep_planner::task::{self, TaskConfig, Tolerance};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::Stance;
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
-use nullsweep_surface::scan::{CleanConfig, CropBox, Placement, clean_region, place};
-use nullsweep_surface::simulate::{self, SimulatedView};
+use nullsweep_surface::{
+    CleanConfig, CropBox, Placement, clean_region, place, simulate, simulate::SimulatedView,
+};
 
 /// What the digests below were taken with: see [`rounding`].
 const ROUNDING: u64 = 0x4c02_b0fa_2b1f_2259;

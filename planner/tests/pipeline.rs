@@ -7,8 +7,7 @@ use nullsweep_planner::sweep::{contact_motion, coverage};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::Stance;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
-use nullsweep_surface::scan::{CleanConfig, Placement, clean_region, place};
-use nullsweep_surface::simulate;
+use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
 
 fn seat() -> Scene {
     let view = simulate::chair(1);

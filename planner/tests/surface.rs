@@ -7,9 +7,9 @@ use nalgebra::{
 };
 use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::Tool;
-use nullsweep_surface::scan::{self, CleanConfig, Placement, RawScan, Scan};
-use nullsweep_surface::sheet::{Surface, SurfacePoint};
-use nullsweep_surface::simulate;
+use nullsweep_surface::{
+    CleanConfig, Placement, RawScan, Scan, Surface, SurfacePoint, scan, simulate,
+};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

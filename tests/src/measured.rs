@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::{Arm, JointVector};
-use nullsweep_surface::scan::Scan;
+use nullsweep_surface::Scan;
 use serde::{Deserialize, Serialize};
 
 /// Shares of the surface that were swept.

@@ -13,7 +13,7 @@ use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::tour::joint::JointConfig;
 use nullsweep_planner::workcell::stance::StanceSearch;
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
-use nullsweep_surface::patches::PatchConfig;
+use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
 use crate::choices::ObjectArg;

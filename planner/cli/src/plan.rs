@@ -15,7 +15,7 @@ use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_report as report;
 use nullsweep_robot::{JointVector, MAX_DOF, Robot, Tool};
-use nullsweep_surface::patches::PatchConfig;
+use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg};

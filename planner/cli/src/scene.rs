@@ -9,10 +9,9 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Unit
 use nullsweep_collision::{Obstacle, ObstacleShape};
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
-use nullsweep_surface::scan::{
-    self, CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan,
+use nullsweep_surface::{
+    CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan, scan, simulate,
 };
-use nullsweep_surface::simulate;
 
 use crate::bars::Bars;
 

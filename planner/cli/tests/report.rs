@@ -6,10 +6,9 @@ use nullsweep_report::{
     self as report, JointAxis, Motion, PatchMark, ReportData, ReportError, Table,
 };
 use nullsweep_robot::Tool;
-use nullsweep_surface::patches::{self, PatchConfig};
-use nullsweep_surface::scan::{self, CleanConfig, Placement, Scan};
-use nullsweep_surface::sheet::{Surface, SurfacePoint};
-use nullsweep_surface::simulate;
+use nullsweep_surface::{
+    CleanConfig, PatchConfig, Placement, Scan, Surface, SurfacePoint, patches, scan, simulate,
+};
 
 /// A chair with rows of lines over its patches: as much to show as a real run has.
 fn example() -> ReportData {

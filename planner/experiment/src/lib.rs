@@ -52,8 +52,7 @@ mod tests {
     use nullsweep_planner::tour::formulation::FormulationConfig;
     use nullsweep_planner::tour::joint::JointConfig;
     use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
-    use nullsweep_surface::scan::{self, CleanConfig, Placement};
-    use nullsweep_surface::simulate;
+    use nullsweep_surface::{CleanConfig, Placement, scan, simulate};
 
     use super::*;
 

@@ -6,9 +6,7 @@ use nullsweep_planner::tour::formulation::{self, Stop};
 use nullsweep_planner::workcell::stance::{self, Stance, StanceSearch};
 use nullsweep_planner::workcell::{Sample, contact_pose, direction, middle_out, redundancies};
 use nullsweep_robot::{Arm, ArmError, ArmSpec, JointVector, Robot, Solutions, Tool};
-use nullsweep_surface::patches::{self, Patch, PatchConfig};
-use nullsweep_surface::scan::Scan;
-use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::{Patch, PatchConfig, Scan, Surface, patches};
 use rayon::prelude::*;
 
 /// Where all methods plan: everything in the robot's root frame. Joint limits hold; nothing is

@@ -1,7 +1,7 @@
 //! The joint path of a tour as a plan.
 
 use nullsweep_robot::JointVector;
-use nullsweep_surface::patches::Patch;
+use nullsweep_surface::Patch;
 
 use super::attempt::{Planning, Sequence, Visit};
 use crate::plan::{FORMAT, Held, Plan, PlanKnot, Profile, SurfaceSample};

@@ -1,9 +1,7 @@
 //! One plan for one set of patches, and the patches that are put over what it leaves out.
 
 use nullsweep_robot::{JointVector, Robot};
-use nullsweep_surface::patches::{self, Patch, PatchConfig};
-use nullsweep_surface::scan::Scan;
-use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::{Patch, PatchConfig, Scan, Surface, patches};
 use rayon::prelude::*;
 
 use super::clock::Clock;

@@ -8,7 +8,7 @@
 use std::collections::HashSet;
 
 use nullsweep_robot::JointVector;
-use nullsweep_surface::patches::{self, Patch};
+use nullsweep_surface::{Patch, patches};
 use rayon::prelude::*;
 
 use super::attempt::{Attempt, Planning, Visit};

@@ -2,7 +2,7 @@
 
 use nullsweep_collision::Options;
 use nullsweep_robot::{ArmSpec, JointVector, Tool};
-use nullsweep_surface::patches::PatchConfig;
+use nullsweep_surface::PatchConfig;
 
 use crate::plan::{Continues, CostKind, Method, Plan, PlanError, Profile};
 use crate::roadmap::GraphConfig;

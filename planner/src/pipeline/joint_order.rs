@@ -1,7 +1,7 @@
 //! The order by the cost of the joint motion, in the tracked model.
 
 use nalgebra::Isometry3;
-use nullsweep_surface::patches::Patch;
+use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
 use super::attempt::Planning;

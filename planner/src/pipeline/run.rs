@@ -2,9 +2,7 @@
 
 use nullsweep_collision::World;
 use nullsweep_robot::{Arm, JointVector, Robot};
-use nullsweep_surface::patches::{self, Patch};
-use nullsweep_surface::scan::Scan;
-use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::{Patch, Scan, Surface, patches};
 
 use super::attempt::{Attempt, Planning};
 use super::clock::Clock;

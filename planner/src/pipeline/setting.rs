@@ -3,9 +3,7 @@
 use nalgebra::Point3;
 use nullsweep_collision::World;
 use nullsweep_robot::{Arm, Robot};
-use nullsweep_surface::patches::Patch;
-use nullsweep_surface::scan::Scan;
-use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::{Patch, Scan, Surface};
 use rayon::prelude::*;
 
 use super::error::PipelineError;

@@ -1,8 +1,7 @@
 //! What was swept before a plan begins.
 
 use nullsweep_robot::Arm;
-use nullsweep_surface::patches::Patch;
-use nullsweep_surface::scan::Scan;
+use nullsweep_surface::{Patch, Scan};
 
 use super::error::PipelineError;
 use super::job::{After, Job};

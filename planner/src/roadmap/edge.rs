@@ -1,7 +1,6 @@
 //! A way along the surface between two patches.
 
-use nullsweep_surface::patches::Patch;
-use nullsweep_surface::sheet::{Surface, SurfacePoint};
+use nullsweep_surface::{Patch, Surface, SurfacePoint};
 use serde::{Deserialize, Serialize};
 
 use crate::workcell::heading_of;

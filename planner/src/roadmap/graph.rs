@@ -3,8 +3,7 @@
 use std::collections::HashSet;
 
 use nalgebra::Isometry3;
-use nullsweep_surface::patches::Patch;
-use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::{Patch, Surface};
 use rayon::prelude::*;
 
 use super::edge::{Edge, GraphConfig};

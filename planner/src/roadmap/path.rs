@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use nullsweep_robot::wrap;
-use nullsweep_surface::sheet::SurfacePoint;
+use nullsweep_surface::SurfacePoint;
 
 use super::edge::Edge;
 use crate::workcell::{contact_pose, direction};

@@ -2,8 +2,7 @@
 
 use nalgebra::Isometry3;
 use nullsweep_robot::{Arm, Tool};
-use nullsweep_surface::grid::Grid;
-use nullsweep_surface::scan::Scan;
+use nullsweep_surface::{Grid, Scan};
 
 use super::pads::contact_motion;
 use crate::plan::Trajectory;

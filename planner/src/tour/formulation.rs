@@ -8,7 +8,7 @@ use nullsweep_gtsp::{
     self as gtsp, Block, Budget, Costs, Ends, Instance, InstanceError, Jump, SolveError,
 };
 use nullsweep_robot::Tool;
-use nullsweep_surface::patches::Patch;
+use nullsweep_surface::Patch;
 use serde::{Deserialize, Serialize};
 
 use crate::roadmap::Graph;

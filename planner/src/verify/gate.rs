@@ -3,8 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 use nullsweep_collision::{CollisionError, Options, World};
 use nullsweep_robot::{Arm, ArmError, ArmSpec, Robot};
-use nullsweep_surface::scan::Scan;
-use nullsweep_surface::sheet::Surface;
+use nullsweep_surface::{Scan, Surface};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nullsweep_surface::patches::Patch;
+use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
 use super::contact::{contact_pose, direction};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 use nullsweep_collision::Obstacle;
-use nullsweep_surface::scan::{Region, Scan};
+use nullsweep_surface::{Region, Scan};
 
 /// The surface to sweep and what is around it, in one frame: the floor frame, unless it says
 /// otherwise.

@@ -4,8 +4,7 @@ use nalgebra::{Isometry3, Point3, Rotation2, Vector2, Vector3};
 use nullsweep_robot::{
     Arm, ArmError, CollisionShape, Geometry, JointVector, Robot, Solutions, Tool,
 };
-use nullsweep_surface::patches::Patch;
-use nullsweep_surface::scan::Scan;
+use nullsweep_surface::{Patch, Scan};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
-//! A uniform grid over points: the one neighbour search of the scan stages.
+//! A uniform grid over points: the neighbour search of all stages.
 //!
 //! All searches of these stages ask for everything within a radius that is known beforehand, in
-//! clouds of even density. Points sorted by cell answer that with a few runs of contiguous memory
-//! and without allocation.
+//! clouds of even density. Points sorted by cell (a counting sort) answer that with a few runs of
+//! contiguous memory and without allocation.
 
 use nalgebra::{Point3, Vector3};
 
@@ -57,7 +57,7 @@ impl Grid {
     }
 
     /// The points' indices sorted by cell: the order in which neighbours lie together.
-    pub fn order(&self) -> Vec<usize> {
+    pub(crate) fn order(&self) -> Vec<usize> {
         self.sorted.iter().map(|(_, index)| *index as usize).collect()
     }
 

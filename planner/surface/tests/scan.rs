@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{UnitVector3, Vector3};
-use nullsweep_surface::patches::{self, PatchConfig};
-use nullsweep_surface::scan::{
-    self, CleanConfig, Format, Placement, ReadOptions, Scan, ScanError, ScanWarning,
+use nullsweep_surface::{
+    CleanConfig, PatchConfig, Placement, ReadOptions, Scan, ScanError, patches, scan, scan::Format,
+    scan::ScanWarning, simulate, simulate::SimulatedView,
 };
-use nullsweep_surface::simulate::{self, SimulatedView};
 
 /// The test data, or `None` with the reason printed.
 fn data(folder: &str) -> Option<PathBuf> {
