@@ -88,7 +88,7 @@ fn a_plan_goes_on_from_a_knot_and_survives_its_file() {
     for (plan, until) in [(&first.plan, first.plan.knots.len() / 3), (&second.plan, knot)] {
         let mut followed = plan.clone();
         followed.knots.truncate(until + 1);
-        let poses = contact_motion(&followed, &third.arm);
+        let poses = contact_motion(followed.trajectory(), &third.arm);
         let swept = coverage::swept(&third.scan, &poses, &followed.tool);
         for patch in visited(&third) {
             let points = &third.patches[patch].points;
