@@ -1,5 +1,6 @@
 //! The command line of `planner`.
 
+mod advice;
 mod bars;
 mod choices;
 mod experiment;
@@ -88,6 +89,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(e) => {
             eprintln!("planner: {e:#}");
+            if let Some(advice) = advice::advice(&e) {
+                eprintln!("help: {advice}");
+            }
             ExitCode::from(FAILED)
         }
     }

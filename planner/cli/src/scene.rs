@@ -13,6 +13,7 @@ use nullsweep_surface::{
     CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan, scan, simulate,
 };
 
+use crate::advice;
 use crate::bars::Bars;
 
 /// How the scans stand and what of them is swept.
@@ -122,7 +123,8 @@ fn read_scans(
     for (i, path) in scans.iter().enumerate() {
         let raw = scan::read(path, &options)?;
         for warning in &raw.warnings {
-            bars.note(&format!("{}: {warning}", path.display()));
+            let advice = advice::on_warning(warning).map(|advice| format!(" ({advice})"));
+            bars.note(&format!("{}: {warning}{}", path.display(), advice.unwrap_or_default()));
         }
         let placement = match (args.sensor_pose.get(i), &shared) {
             (Some(pose), _) => Placement::SensorPose(isometry(pose)?),

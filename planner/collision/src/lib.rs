@@ -172,10 +172,7 @@ pub struct Options {
 #[derive(Debug, thiserror::Error)]
 pub enum CollisionError {
     /// A link's (or attached object's) mesh cannot be used.
-    #[error(
-        "collision mesh of {link}: {error}; give the mesh, or let capsules stand in for it with \
-         --fit-capsules RADIUS"
-    )]
+    #[error("collision mesh of {link}: {error}")]
     Mesh {
         /// The link or object.
         link: String,

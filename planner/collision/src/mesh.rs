@@ -18,7 +18,7 @@ pub struct MeshPaths {
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
     /// The URI names a package that has no folder.
-    #[error("package `{package}` has no folder: name one with --package {package}=FOLDER")]
+    #[error("package `{package}` has no folder")]
     UnknownPackage {
         /// The package's name.
         package: String,
@@ -188,7 +188,7 @@ mod tests {
         assert_eq!(paths.resolve("file://x/a.stl").unwrap(), Path::new("x/a.stl"));
         assert_eq!(paths.resolve("a.stl").unwrap(), Path::new("urdf/a.stl"));
         let unknown = paths.resolve("package://leg/a.stl").unwrap_err().to_string();
-        assert!(unknown.contains("--package leg="), "{unknown}");
+        assert!(unknown.contains("`leg`"), "{unknown}");
         assert!(matches!(paths.resolve("http://x/a.stl"), Err(MeshError::Scheme { .. })));
     }
 }

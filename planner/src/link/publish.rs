@@ -41,12 +41,10 @@ pub enum PublishError {
     #[error("waiting for the executor: {0}")]
     Port(#[from] PortError),
     /// `--join knot` for a plan that continues none.
-    #[error(
-        "the plan does not continue another one: make it with `planner plan --continue PLAN@K`, or publish it with --join stop"
-    )]
+    #[error("the plan does not continue another one, so there is no knot to join")]
     ContinuesNothing,
     /// `--join knot` while nothing is executed.
-    #[error("the executor executes no plan that could be joined: publish with --join stop")]
+    #[error("the executor executes no plan that could be joined")]
     NothingRuns,
     /// No telemetry came.
     #[error("the executor sends no telemetry: is it running?")]

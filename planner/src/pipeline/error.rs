@@ -26,16 +26,14 @@ pub enum PipelineError {
     #[error("checking the plan: {0}")]
     Verify(#[from] VerifyError),
     /// No patch was found.
-    #[error(
-        "no locally planar patch among {points} points: is the scale metres? try a larger patch (--patch-radius)"
-    )]
+    #[error("no locally planar patch among {points} points: are they in metres?")]
     NoPatches {
         /// How many points.
         points: usize,
     },
     /// No stance reaches anything.
     #[error(
-        "no stance of {tried} reaches any of the {patches} patches: is the object within the arm's height? try --torso or --base x,y,yaw"
+        "no stance of {tried} reaches any of the {patches} patches: is the object within the arm's height?"
     )]
     NoStance {
         /// Stances tried with an exact look.
@@ -44,13 +42,13 @@ pub enum PipelineError {
         patches: usize,
     },
     /// The body collides where it stands.
-    #[error("the robot collides where it stands: {hit}; choose another --base")]
+    #[error("the robot collides where it stands: {hit}")]
     StanceHit {
         /// With what.
         hit: String,
     },
     /// The arm collides where it starts.
-    #[error("the arm collides in its start posture: {hit}; give another --start")]
+    #[error("the arm collides in its start posture: {hit}")]
     StartHit {
         /// With what.
         hit: String,
@@ -70,7 +68,7 @@ pub enum PipelineError {
         high: f64,
     },
     /// No patch can be reached.
-    #[error("none of the {patches} patches can be reached from base {base:?}: try --base auto")]
+    #[error("none of the {patches} patches can be reached from base {base:?}")]
     NothingReached {
         /// How many patches.
         patches: usize,
@@ -79,7 +77,7 @@ pub enum PipelineError {
     },
     /// No motion to any patch was found.
     #[error(
-        "no motion from the start posture to any of the {reachable} reachable patches was found; give another --start"
+        "no motion from the start posture to any of the {reachable} reachable patches was found"
     )]
     NoMotion {
         /// How many patches are reachable.

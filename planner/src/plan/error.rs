@@ -19,7 +19,7 @@ pub enum PlanError {
         source: std::io::Error,
     },
     /// The file is not a plan.
-    #[error("{path}: not a plan file: {source} (make one with `planner plan`)")]
+    #[error("{path}: not a plan file: {source}")]
     Parse {
         /// Which file.
         path: PathBuf,
@@ -35,9 +35,7 @@ pub enum PlanError {
         found: u32,
     },
     /// More knots than the wire takes.
-    #[error(
-        "the plan has {found} knots, the wire takes {MAX_KNOTS}: plan fewer patches at once (--crop)"
-    )]
+    #[error("the plan has {found} knots, the wire takes {MAX_KNOTS}")]
     TooLong {
         /// How many.
         found: usize,

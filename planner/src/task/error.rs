@@ -25,9 +25,7 @@ pub enum TaskError {
         poses: usize,
     },
     /// No way through free space between two poses.
-    #[error(
-        "no motion through free space was found from pose {from} to pose {to}: try another --seed"
-    )]
+    #[error("no motion through free space was found from pose {from} to pose {to}")]
     NoTransfer {
         /// The pose before.
         from: usize,

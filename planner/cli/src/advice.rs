@@ -1,0 +1,165 @@
+//! What to try when a command fails. The libraries say what is wrong; the flags that mend it are
+//! known only here.
+
+use std::error::Error;
+
+use nullsweep_collision::{CollisionError, MeshError};
+use nullsweep_planner::link::publish::PublishError;
+use nullsweep_planner::link::replan::ReplanError;
+use nullsweep_planner::pipeline::PipelineError;
+use nullsweep_planner::plan::PlanError;
+use nullsweep_planner::task::TaskError;
+use nullsweep_surface::ScanError;
+use nullsweep_surface::scan::ScanWarning;
+
+/// A line of advice for an error, where a flag can help: that of the outermost cause with any.
+pub(super) fn advice(error: &anyhow::Error) -> Option<String> {
+    error.chain().find_map(known)
+}
+
+fn known(error: &(dyn Error + 'static)) -> Option<String> {
+    if let Some(error) = error.downcast_ref() {
+        scan(error)
+    } else if let Some(error) = error.downcast_ref() {
+        pipeline(error)
+    } else if let Some(error) = error.downcast_ref() {
+        task(error)
+    } else if let Some(error) = error.downcast_ref() {
+        plan(error)
+    } else if let Some(error) = error.downcast_ref() {
+        publish(error)
+    } else if let Some(ReplanError::Publish(error)) = error.downcast_ref() {
+        publish(error)
+    } else if let Some(error) = error.downcast_ref() {
+        collision(error)
+    } else {
+        None
+    }
+}
+
+fn scan(error: &ScanError) -> Option<String> {
+    let text = match error {
+        ScanError::EmptyCrop { .. } => {
+            "widen --crop, or check with --sensor-pose or --up where the scan stands"
+        }
+        ScanError::NoSurface { .. } => {
+            "--scale takes the file's unit to metres: 0.001 for millimetres"
+        }
+        _ => return None,
+    };
+    Some(text.into())
+}
+
+/// The same for what a scan merely warns of.
+pub(super) fn on_warning(warning: &ScanWarning) -> Option<&'static str> {
+    matches!(warning, ScanWarning::LooksLikeMillimetres { .. })
+        .then_some("--scale 0.001 reads millimetres")
+}
+
+fn pipeline(error: &PipelineError) -> Option<String> {
+    let text = match error {
+        PipelineError::NoPatches { .. } => {
+            "--scale takes the file's unit to metres; else try a larger --patch-radius"
+        }
+        PipelineError::NoStance { .. } => {
+            "try another height with --torso, or say where the robot stands: --base x,y,yaw"
+        }
+        PipelineError::StanceHit { .. } => "choose another --base",
+        PipelineError::StartHit { .. }
+        | PipelineError::StartLimit { .. }
+        | PipelineError::NoMotion { .. } => "give another --start",
+        PipelineError::NothingReached { .. } => {
+            "--base auto looks for where the robot reaches most"
+        }
+        PipelineError::NoSuchKnot { knots, .. } => {
+            return Some(format!(
+                "--continue PLAN@K takes K from 0 to {}",
+                knots.saturating_sub(1)
+            ));
+        }
+        PipelineError::Collision(error) => return collision(error),
+        _ => return None,
+    };
+    Some(text.into())
+}
+
+fn task(error: &TaskError) -> Option<String> {
+    match error {
+        TaskError::NothingMet { .. } => Some("--chain BASE,TIP names the tip link".into()),
+        TaskError::NoTransfer { .. } => Some("try another --seed".into()),
+        TaskError::Collision(error) => collision(error),
+        _ => None,
+    }
+}
+
+fn plan(error: &PlanError) -> Option<String> {
+    let text = match error {
+        PlanError::Parse { .. } => "`planner plan` makes a plan file",
+        PlanError::TooLong { .. } => "plan fewer patches at once: --crop keeps a part of the scan",
+        _ => return None,
+    };
+    Some(text.into())
+}
+
+fn publish(error: &PublishError) -> Option<String> {
+    let text = match error {
+        PublishError::ContinuesNothing => {
+            "make the plan with `planner plan --continue PLAN@K`, or publish it with --join stop"
+        }
+        PublishError::NothingRuns => "`planner publish --join stop` sends a plan to an idle arm",
+        PublishError::Plan(error) => return plan(error),
+        _ => return None,
+    };
+    Some(text.into())
+}
+
+fn collision(error: &CollisionError) -> Option<String> {
+    let folder = |error: &MeshError| match error {
+        MeshError::UnknownPackage { package } => {
+            Some(format!("--package {package}=FOLDER says where its meshes are"))
+        }
+        _ => None,
+    };
+    match error {
+        CollisionError::Mesh { error, .. } => {
+            const CAPSULES: &str = "--fit-capsules RADIUS puts capsules in place of missing meshes";
+            Some(folder(error).map_or(CAPSULES.into(), |folder| format!("{folder}; {CAPSULES}")))
+        }
+        CollisionError::ObstacleMesh { error, .. } => folder(error),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::Context;
+
+    use super::*;
+
+    fn of(error: impl Into<anyhow::Error>) -> String {
+        advice(&error.into()).expect("advice")
+    }
+
+    #[test]
+    fn it_is_found_through_errors_and_contexts_around_the_cause() {
+        let mesh = || CollisionError::Mesh {
+            link: "hand".into(),
+            error: MeshError::UnknownPackage { package: "gripper".into() },
+        };
+        for advice in [of(mesh()), of(PipelineError::from(mesh())), of(TaskError::from(mesh()))] {
+            assert!(advice.starts_with("--package gripper=FOLDER"), "{advice}");
+            assert!(advice.contains("--fit-capsules"), "{advice}");
+        }
+        let plan = || PlanError::TooLong { found: 9 };
+        assert!(of(PublishError::from(plan())).contains("--crop"));
+        assert!(of(ReplanError::from(PublishError::from(plan()))).contains("--crop"));
+        let context = Err::<(), _>(plan()).context("while publishing").unwrap_err();
+        assert!(of(context).contains("--crop"));
+    }
+
+    #[test]
+    fn there_is_none_where_no_flag_helps() {
+        assert_eq!(advice(&anyhow::anyhow!("the disk is full")), None);
+        assert_eq!(advice(&PublishError::NoTelemetry.into()), None);
+    }
+}
