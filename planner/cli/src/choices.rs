@@ -24,7 +24,7 @@ macro_rules! choices {
 choices! {
     /// How the order is found.
     MethodArg for Method {
-        /// Shortest Euclidean way; the headings follow from it.
+        /// Shortest Euclidean tour; the headings follow from it.
         Tsp,
         /// A node for each patch and incident edge; distance and turning are weighed (Eq. 4).
         Curvature,

@@ -44,7 +44,7 @@ pub(super) struct GtspArgs {
 /// Ways to solve an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum Method {
-    /// The search of this crate.
+    /// The search on the generalized problem itself.
     Search,
     /// Behzad and Modarres' transformation and a Lin–Kernighan-style search of the ATSP.
     Transformed,
