@@ -8,12 +8,10 @@ use nullsweep_experiment::{self as experiment, Object, Plan, Setting};
 use nullsweep_planner::pipeline::{Job, StanceChoice};
 use nullsweep_planner::plan::Method;
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::tour::joint::JointConfig;
 use nullsweep_planner::workcell::stance::StanceSearch;
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
-use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
 use crate::choices::ObjectArg;
@@ -67,12 +65,15 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
     };
     let demo = args.scans.is_empty().then_some(demo);
     let scene = scene(&args.scene, demo, &args.scans, args.seed, &bars)?;
-    let surface = &scene.surface;
-    let tool = Tool { symmetric: args.symmetric, ..Tool::default() };
-    let spec = ArmSpec::pr2(Side::Right);
-    let (patches, graph) = (PatchConfig::default(), GraphConfig::default());
+    let job = Job {
+        tool: Tool { symmetric: args.symmetric, ..Tool::default() },
+        stance: StanceChoice::Search(StanceSearch::default()),
+        formulation: FormulationConfig { beta: args.beta, ..FormulationConfig::default() },
+        seed: args.seed,
+        ..Job::new(ArmSpec::pr2(Side::Right))
+    };
     bars.stage("setting", None);
-    let setting = Setting::new(&robot, &spec, &tool, surface, &patches, &graph, args.seed)?;
+    let setting = Setting::new(&robot, &scene.surface, &job)?;
     let title = match args.scans.first().and_then(|path| path.file_stem()) {
         Some(stem) => format!("Experiment: {}", stem.to_string_lossy()),
         None => format!("Experiment: {}", name(args.object.into())),
@@ -87,7 +88,7 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
         samples,
         repeats: args.repeats as usize,
         seed: args.seed,
-        formulation: FormulationConfig { beta: args.beta, ..FormulationConfig::default() },
+        formulation: job.formulation,
         joint: JointConfig::default(),
     };
     let (mut report, shown) = experiment::run(&setting, &plan, &bars)?;
@@ -95,15 +96,6 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
         report.straight = Some(experiment::look_between(&setting, &robot, run)?);
     }
     if args.tracked_repeats > 0 {
-        let job = Job {
-            tool,
-            stance: StanceChoice::Search(StanceSearch::default()),
-            patches,
-            graph,
-            formulation: plan.formulation,
-            seed: args.seed,
-            ..Job::new(spec)
-        };
         let repeats = args.tracked_repeats as usize;
         report.tracked = experiment::tracked(&robot, &scene, &job, repeats, &bars)?;
     }

@@ -47,6 +47,7 @@ pub enum Quantity {
 
 #[cfg(test)]
 mod tests {
+    use nullsweep_planner::pipeline::Job;
     use nullsweep_planner::plan::CostKind;
     use nullsweep_planner::progress::Silent;
     use nullsweep_planner::tour::formulation::FormulationConfig;
@@ -62,10 +63,8 @@ mod tests {
         let placed = scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose)).0;
         let (scan, _) = scan::clean(&placed, &CleanConfig::default()).expect("a surface");
         let tool = Tool { symmetric: false, ..Tool::default() };
-        let spec = ArmSpec::pr2(Side::Right);
-        let (patches, graph) = (Default::default(), Default::default());
-        let setting = Setting::new(&Robot::pr2(), &spec, &tool, &scan, &patches, &graph, 3)
-            .expect("within reach");
+        let job = Job { tool, seed: 3, ..Job::new(ArmSpec::pr2(Side::Right)) };
+        let setting = Setting::new(&Robot::pr2(), &scan, &job).expect("within reach");
         let reached: Vec<usize> =
             (0..setting.patches.len()).filter(|&i| setting.reached[i].is_some()).collect();
         assert!(reached.len() > 30, "{}", reached.len());

@@ -1,12 +1,13 @@
 //! The paper's setting (§V): a robot before an object, patches within its reach, and the graph.
 
 use nalgebra::Isometry3;
-use nullsweep_planner::roadmap::{Graph, GraphConfig, graph};
+use nullsweep_planner::pipeline::Job;
+use nullsweep_planner::roadmap::{Graph, Nodes, graph};
 use nullsweep_planner::tour::formulation::{self, Stop};
 use nullsweep_planner::workcell::stance::{self, Stance, StanceSearch};
 use nullsweep_planner::workcell::{Sample, contact_pose, direction, middle_out, redundancies};
-use nullsweep_robot::{Arm, ArmError, ArmSpec, JointVector, Robot, Solutions, Tool};
-use nullsweep_surface::{Patch, PatchConfig, Scan, Surface, patches};
+use nullsweep_robot::{Arm, ArmError, JointVector, Robot, Solutions, Tool};
+use nullsweep_surface::{Patch, Scan, Surface, patches};
 use rayon::prelude::*;
 
 /// Where all methods plan: everything in the robot's root frame. Joint limits hold; nothing is
@@ -57,21 +58,14 @@ const VALUES: usize = 100;
 
 impl Setting {
     /// Patches on the cleaned scan (floor frame), the stance that reaches most of its points, and
-    /// the graph.
+    /// the graph, as the job's arm, tool, patches, graph and seed say.
     ///
     /// # Errors
     /// See [`SettingError`].
-    pub fn new(
-        robot: &Robot,
-        spec: &ArmSpec,
-        tool: &Tool,
-        scan: &Scan,
-        patches: &PatchConfig,
-        graph: &GraphConfig,
-        seed: u64,
-    ) -> Result<Self, SettingError> {
-        let arm = robot.arm(spec)?;
-        let found = patches::find(scan, patches, seed);
+    pub fn new(robot: &Robot, scan: &Scan, job: &Job) -> Result<Self, SettingError> {
+        let tool = &job.tool;
+        let arm = robot.arm(&job.arm)?;
+        let found = patches::find(scan, &job.patches, job.seed);
         let search = StanceSearch { finalists: FINALISTS, ..StanceSearch::default() };
         let candidates = stance::candidates(robot, &arm, tool, scan, &found, &search)?;
         let judged: Vec<Result<(usize, Stance, Arm), ArmError>> = candidates
@@ -102,7 +96,10 @@ impl Setting {
         let surface = Surface::new(&scan);
         let reached: Vec<Option<Sample>> =
             patches.par_iter().map(|p| reach(&arm, tool, p)).collect();
-        let graph = graph::unchecked(&surface, &patches, &reached, graph);
+        let graph = graph::unchecked(
+            Nodes { surface: &surface, patches: &patches, reached: &reached },
+            &job.graph,
+        );
         let start = arm.home();
         let tool = tool.clone();
         Ok(Self { arm, tool, stance, scan, surface, patches, reached, graph, start })

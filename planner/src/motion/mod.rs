@@ -1,5 +1,13 @@
-//! The joint path through the tour's poses.
+//! The joint path through the tour's poses: tracked along the surface where that goes, else lifted
+//! off, through free space, and set down.
 
+mod jump;
 pub mod layered;
-pub mod mover;
-pub mod transfer;
+mod mover;
+mod retreat;
+mod rrt_connect;
+
+pub use jump::jump;
+pub use mover::{Leg, Mover, lift_cost};
+pub use retreat::{lift, retract};
+pub use rrt_connect::{Options as RrtOptions, rrt_connect};

@@ -4,9 +4,10 @@ use nalgebra::Point3;
 use nullsweep_robot::JointVector;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
+use super::jump::jump;
+use super::layered::{Link, Motion, Moves};
+use super::retreat::lift;
 use crate::cost::{self, Cost};
-use crate::motion::layered::{Link, Motion, Moves};
-use crate::motion::transfer;
 use crate::roadmap::{Blocked, Edge, Graph, ToolPath, Track};
 use crate::workcell::{Sample, Workcell};
 
@@ -55,7 +56,8 @@ const LIFT_JOINTS: usize = 4;
 const LIFT_ANGLE: f64 = 0.8;
 
 /// What a jump adds to its way, for an arm of `dof` joints.
-pub(crate) fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
+#[must_use]
+pub fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
     let mut lift = JointVector::ZERO;
     lift[..LIFT_JOINTS.min(dof)].fill(LIFT_ANGLE);
     cost.of(&lift)
@@ -143,7 +145,7 @@ impl<C: Cost> Moves for Mover<'_, C> {
 
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<Leg>> {
         let start = from.map_or(self.source, |s| s.q);
-        let joints = transfer::jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
+        let joints = jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
         let cost = self.lift + cost::of_path(self.cost, &joints);
         let contact = self.cell.tool.contact_in_tip();
         let pad = |q: &JointVector| {
@@ -160,7 +162,7 @@ impl<C: Cost> Moves for Mover<'_, C> {
     }
 
     fn lifts(&self, at: &Sample) -> bool {
-        transfer::lift(self.cell, &at.q).is_some()
+        lift(self.cell, &at.q).is_some()
     }
 
     fn jump_estimate(&self, straight: f64) -> f64 {

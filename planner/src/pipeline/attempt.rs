@@ -8,11 +8,10 @@ use super::clock::Clock;
 use super::error::PipelineError;
 use super::job::Job;
 use crate::cost::{Cost, Effort, TaskTime};
-use crate::motion::layered;
-use crate::motion::mover::{Leg, Mover};
+use crate::motion::{Leg, Mover, layered};
 use crate::plan::{Continues, CostKind, Method, Plan};
 use crate::progress::Progress;
-use crate::roadmap::{Graph, graph};
+use crate::roadmap::{Graph, Nodes, graph};
 use crate::sweep::{contact_motion, coverage};
 use crate::tour::formulation::{self, Stop};
 use crate::workcell::stance::Stance;
@@ -88,15 +87,8 @@ impl Planning<'_> {
     ) -> Result<Attempt, PipelineError> {
         let Self { job, cell, progress, .. } = *self;
         let graph = clock.time("graph", || {
-            graph::build(
-                cell,
-                self.surface,
-                &patches,
-                &visit,
-                &job.graph,
-                before.map(|b| &b.graph),
-                progress,
-            )
+            let nodes = Nodes { surface: self.surface, patches: &patches, reached: &visit };
+            graph::build(cell, nodes, &job.graph, before.map(|b| &b.graph), progress)
         });
         progress.stage("tour", None);
         let tool_pose = cell.arm.tip_pose(&self.start) * job.tool.contact_in_tip();

@@ -16,7 +16,7 @@ use super::clock::Clock;
 use super::swept::SWEPT_SHARE;
 use crate::cost::{Cost, Effort, TaskTime};
 use crate::motion::layered::{Motion, Moves};
-use crate::motion::mover::{Leg, Mover};
+use crate::motion::{Leg, Mover};
 use crate::plan::CostKind;
 use crate::roadmap::Edge;
 use crate::sweep::coverage;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::attempt::Planning;
 use crate::cost::{Cost, Effort, TaskTime};
-use crate::motion::mover::lift_cost;
+use crate::motion::lift_cost;
 use crate::plan::CostKind;
 use crate::roadmap::Graph;
 use crate::tour::formulation::{self, FormulationError, JUMP, Stop};

@@ -10,7 +10,7 @@ use super::error::PipelineError;
 use super::job::{Job, StanceChoice};
 use super::start::start;
 use crate::progress::Silent;
-use crate::roadmap::{GraphConfig, graph};
+use crate::roadmap::{GraphConfig, Nodes, graph};
 use crate::workcell::stance::{self, Stance, StanceSearch};
 use crate::workcell::{Sample, Scene, Workcell, reach};
 
@@ -135,8 +135,8 @@ impl Setting {
     fn score(&self, job: &Job, reached: &[Option<Sample>]) -> usize {
         let surface = Surface::new(&self.scan);
         let config = GraphConfig { edge_samples: 24, ..job.graph };
-        let graph =
-            graph::build(self.cell(job), &surface, &self.patches, reached, &config, None, &Silent);
+        let nodes = Nodes { surface: &surface, patches: &self.patches, reached };
+        let graph = graph::build(self.cell(job), nodes, &config, None, &Silent);
         (0..self.patches.len())
             .filter(|&i| reached[i].is_some())
             .map(|i| self.patches[i].points.len() * (1 + graph.incident[i].len().min(WELL_JOINED)))

@@ -13,5 +13,5 @@ pub use curve::Curve;
 pub use error::{FORMAT, PlanError};
 pub use file::{Continues, Held, Plan, Stretch, SurfaceSample};
 pub use knot::PlanKnot;
-pub use settings::{CostKind, Method, Profile};
+pub use settings::{BLEND_TOLERANCE, CostKind, LIFT, LINE_TOLERANCE, Method, Profile};
 pub use trajectory::Trajectory;

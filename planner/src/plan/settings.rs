@@ -2,6 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
+/// How far the pad is lifted off the surface before it travels; from there on the tool keeps its
+/// margin. \[m\]
+pub const LIFT: f64 = 0.05;
+/// Farthest that the pad's centre may leave the planned line between two knots of a tracked edge.
+/// \[m\]
+pub const LINE_TOLERANCE: f64 = 1e-4;
+/// The same where a corner is blended: half as much again, what straight joint lines between knots
+/// leave it by included. \[m\]
+pub const BLEND_TOLERANCE: f64 = 1.5e-4;
+
 /// How the order is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

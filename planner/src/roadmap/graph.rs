@@ -58,20 +58,30 @@ impl Graph {
     }
 }
 
-/// Builds the graph over the patches that `reached` marks: each patch's nearest neighbours
+/// What a graph is built over.
+#[derive(Clone, Copy)]
+pub struct Nodes<'a> {
+    /// The scanned surface.
+    pub surface: &'a Surface,
+    /// Its patches.
+    pub patches: &'a [Patch],
+    /// A sample of each patch that is to be a node.
+    pub reached: &'a [Option<Sample>],
+}
+
+/// Builds the graph over the patches that are reached: each patch's nearest neighbours
 /// within the radius, in the union of both directions, joined where a surface line exists and
 /// some branch can be followed along it: at one redundancy value, or else with a detour. What
 /// `before` found between the first patches, which must be the same, is taken over.
 #[must_use]
 pub fn build(
     cell: Workcell<'_>,
-    surface: &Surface,
-    patches: &[Patch],
-    reached: &[Option<Sample>],
+    nodes: Nodes<'_>,
     config: &GraphConfig,
     before: Option<&Graph>,
     progress: &dyn Progress,
 ) -> Graph {
+    let Nodes { surface, patches, reached } = nodes;
     let pairs = neighbour_pairs(patches, reached, config);
     progress.stage("graph", Some(pairs.len()));
     let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
@@ -99,12 +109,8 @@ pub fn build(
 /// The graph of the paper's model, between whose nodes no arm is followed: each patch's nearest
 /// neighbours joined wherever a surface line leads.
 #[must_use]
-pub fn unchecked(
-    surface: &Surface,
-    patches: &[Patch],
-    reached: &[Option<Sample>],
-    config: &GraphConfig,
-) -> Graph {
+pub fn unchecked(nodes: Nodes<'_>, config: &GraphConfig) -> Graph {
+    let Nodes { surface, patches, reached } = nodes;
     let (mut edges, mut apart) = (Vec::new(), Vec::new());
     for (a, b) in neighbour_pairs(patches, reached, config) {
         match Edge::between(surface, patches, a, b, config) {

@@ -7,6 +7,6 @@ mod path;
 mod track;
 
 pub use edge::{Edge, GraphConfig};
-pub use graph::Graph;
+pub use graph::{Graph, Nodes};
 pub use path::ToolPath;
 pub use track::{Blocked, Track, TrackFailure};

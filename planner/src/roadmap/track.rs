@@ -5,6 +5,7 @@ use nullsweep_collision::ToolContact;
 use nullsweep_robot::{Branch, JointLimits, JointVector, MAX_DOF, wrap};
 
 use super::path::ToolPath;
+use crate::plan::LINE_TOLERANCE;
 use crate::workcell::{Sample, Workcell};
 
 /// Joint vectors and pad centres along a tool path, both ends included.
@@ -40,8 +41,6 @@ pub struct Blocked {
     pub redundancy: f64,
 }
 
-/// Farthest that the pad may leave the planned line between two joint vectors. \[m\]
-const LINE_TOLERANCE: f64 = 1e-4;
 /// Most times that a step of the line is halved to stay within [`LINE_TOLERANCE`].
 const MAX_HALVINGS: u32 = 5;
 /// A joint that moves further over one step of the line has changed its branch. \[rad\]

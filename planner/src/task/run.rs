@@ -14,7 +14,7 @@ use super::route::Route;
 use super::search::search;
 use super::space::{Point, RESIDUAL, Space};
 use crate::cost::{self, Effort};
-use crate::motion::transfer;
+use crate::motion::{RrtOptions, rrt_connect};
 use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::verify::{Given, Verification, verify};
@@ -96,7 +96,7 @@ fn edges(
     route: &Route,
     seed: u64,
 ) -> Result<Vec<Option<Vec<JointVector>>>, TaskError> {
-    let options = transfer::Options::default();
+    let options = RrtOptions::default();
     pairs(route)
         .enumerate()
         .map(|(k, (a, b))| {
@@ -105,7 +105,7 @@ fn edges(
             {
                 return Ok(None);
             }
-            let path = transfer::plan(space.world, space.arm, &a.q, &b.q, &options, seed);
+            let path = rrt_connect(space.world, space.arm, &a.q, &b.q, &options, seed);
             let (from, to) = (route.order[k], route.order[k + 1]);
             path.map(Some).ok_or(TaskError::NoTransfer { from, to })
         })

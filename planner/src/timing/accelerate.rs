@@ -8,18 +8,15 @@ use super::Limits;
 use super::run::{Piece, Run};
 use super::sampled::{Timed, braked, timed};
 use super::smooth::{cut, smooth};
-use crate::plan::{Plan, PlanKnot, Profile};
+use crate::plan::{BLEND_TOLERANCE, Plan, PlanKnot, Profile};
 use crate::sweep::distance_to_segment;
 use crate::workcell::Workcell;
 
-/// Farthest that the pad's centre may leave the planned line where a corner is blended: what
-/// straight joint lines between knots leave it by anyway. \[m\]
-const LINE_TOLERANCE: f64 = 1.5e-4;
 /// A blend is checked for collisions on chords that leave it by no more than this. \[rad\]
 const CHORD: f64 = 2e-4;
 
 /// The same path as `plan` (which must be of [`Profile::Velocity`]), its corners blended within
-/// `LINE_TOLERANCE` on the surface and clear of collision everywhere, as fast as the limits
+/// `BLEND_TOLERANCE` on the surface and clear of collision everywhere, as fast as the limits
 /// allow. In the corners at the knots `stops`, and where no blend fits, the arm comes to rest.
 #[must_use]
 pub fn accelerate(plan: &Plan, cell: Workcell<'_>, limits: &Limits, stops: &[usize]) -> Plan {
@@ -155,7 +152,7 @@ impl Judge<'_> {
         };
         let near = |q: &JointVector, other: Option<Point3<f64>>| {
             let end = other.unwrap_or(corner);
-            distance_to_segment(&pad(q), &corner, &end) <= LINE_TOLERANCE
+            distance_to_segment(&pad(q), &corner, &end) <= BLEND_TOLERANCE
         };
         let (before, after) = (
             self.plan.line(i - 1).filter(|_| self.plan.on_surface(i)),

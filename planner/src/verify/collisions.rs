@@ -6,12 +6,12 @@ use nullsweep_robot::Arm;
 use rayon::prelude::*;
 
 use super::violation::{Violation, ViolationKind};
-use crate::plan::Plan;
+use crate::plan::{LIFT, Plan};
 
 /// Joints move at most this far between two looks at collisions. \[rad\] or \[m\]
 const COLLISION_STEP: f64 = 0.02;
-/// How far the pad is lifted off the surface before it must keep its margin, with some slack. \[m\]
-const LIFT: f64 = 0.052;
+/// What a lift may exceed [`LIFT`] by. \[m\]
+const LIFT_SLACK: f64 = 0.002;
 
 /// Exact collision checks along every segment.
 pub(super) fn collisions(
@@ -46,7 +46,7 @@ pub(super) fn collisions(
 
 /// Which segments of transfers, by the knot that ends them, lift the pad off the surface or set it
 /// down: those next to a knot on the surface, or at the plan's start, until the pad's centre is
-/// [`LIFT`] away. There it may still touch.
+/// [`LIFT`] away, with some slack. There it may still touch.
 fn lifts(plan: &Plan, arm: &Arm) -> Vec<bool> {
     let contact = plan.tool.contact_in_tip();
     let centre =
@@ -55,7 +55,7 @@ fn lifts(plan: &Plan, arm: &Arm) -> Vec<bool> {
     let starts_in_contact = |k: usize| plan.knots[k].line.is_some() || k == 0;
     for k in 0..plan.knots.len() {
         if starts_in_contact(k) {
-            let near = |other: usize| (centre(other) - centre(k)).norm() <= LIFT;
+            let near = |other: usize| (centre(other) - centre(k)).norm() <= LIFT + LIFT_SLACK;
             let up = (k + 1..plan.knots.len()).take_while(|&n| !plan.on_surface(n) && near(n));
             up.for_each(|n| lifts[n] = true);
             let down = (1..=k).rev().take_while(|&n| !plan.on_surface(n) && near(n - 1));
