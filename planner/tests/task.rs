@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use nullsweep_collision::Options;
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::task::{self, Outcome, TaskConfig, Tolerance};
+use nullsweep_planner::task::{self, TaskConfig, TaskOutcome, Tolerance};
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
 
 /// Poses on a dome before the PR2: z into it, x upwards.
@@ -39,7 +39,7 @@ fn config(tolerance: Tolerance) -> TaskConfig {
     }
 }
 
-fn plan(tolerance: Tolerance) -> Outcome {
+fn plan(tolerance: Tolerance) -> TaskOutcome {
     task::run(&Robot::pr2(), &dome(), &config(tolerance), &Silent).unwrap()
 }
 

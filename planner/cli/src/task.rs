@@ -7,7 +7,7 @@ use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::task::{self, Figures, TaskConfig, Tolerance};
+use nullsweep_planner::task::{self, TaskConfig, TaskFigures, Tolerance};
 
 use crate::bars::Bars;
 use crate::robot::RobotArgs;
@@ -99,7 +99,7 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
     Ok(VIOLATIONS)
 }
 
-fn table(f: &Figures) -> Table {
+fn table(f: &TaskFigures) -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
     let mm = |metres: f64| format!("{:.2}", metres * 1e3);

@@ -12,7 +12,7 @@ use plotters::drawing::{DrawingArea, IntoDrawingArea};
 use plotters::element::{Circle, PathElement, Rectangle, Text};
 use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle, WHITE};
 
-use crate::methods::Run;
+use crate::methods::MethodRun;
 use crate::setting::Setting;
 
 /// Why a figure could not be drawn.
@@ -47,7 +47,7 @@ pub fn write(
     directory: &Path,
     name: &str,
     setting: &Setting,
-    runs: &[(Method, Run)],
+    runs: &[(Method, MethodRun)],
 ) -> Result<Vec<PathBuf>, FigureError> {
     let view = View::new(setting);
     let mut written = Vec::new();
@@ -76,7 +76,7 @@ pub fn write(
 }
 
 /// Figure 2: the object, its patches with normals, the graph and a solution.
-fn process(area: &Area<'_>, setting: &Setting, runs: &[(Method, Run)], view: &View) -> Drawn {
+fn process(area: &Area<'_>, setting: &Setting, runs: &[(Method, MethodRun)], view: &View) -> Drawn {
     let panels = area.split_evenly((2, 2));
     let stride = setting.scan.points.len().div_ceil(POINTS).max(1);
     caption(&panels[0], "(a) scanned points")?;
@@ -101,7 +101,7 @@ fn process(area: &Area<'_>, setting: &Setting, runs: &[(Method, Run)], view: &Vi
 }
 
 /// Figure 4: displacement of each joint along the whole path.
-fn joints(area: &Area<'_>, setting: &Setting, runs: &[(Method, Run)]) -> Drawn {
+fn joints(area: &Area<'_>, setting: &Setting, runs: &[(Method, MethodRun)]) -> Drawn {
     let dof = setting.arm.dof();
     let continuous = setting.arm.continuous();
     let moved: Vec<Vec<f64>> = runs
@@ -147,8 +147,8 @@ fn joints(area: &Area<'_>, setting: &Setting, runs: &[(Method, Run)]) -> Drawn {
     Ok(())
 }
 
-/// Figures 6 and 7: the paths of the methods side by side.
-fn paths(area: &Area<'_>, setting: &Setting, runs: &[(Method, Run)], view: &View) -> Drawn {
+/// PathFigures 6 and 7: the paths of the methods side by side.
+fn paths(area: &Area<'_>, setting: &Setting, runs: &[(Method, MethodRun)], view: &View) -> Drawn {
     for (panel, (method, run)) in area.split_evenly((1, runs.len().max(1))).iter().zip(runs) {
         caption(panel, label(*method))?;
         for patch in &setting.patches {
@@ -180,7 +180,13 @@ fn graph(panel: &Area<'_>, setting: &Setting, view: &View, color: RGBColor) -> D
 }
 
 /// The tour; jumps are thin.
-fn path(panel: &Area<'_>, setting: &Setting, run: &Run, view: &View, color: RGBColor) -> Drawn {
+fn path(
+    panel: &Area<'_>,
+    setting: &Setting,
+    run: &MethodRun,
+    view: &View,
+    color: RGBColor,
+) -> Drawn {
     for pair in run.path.windows(2) {
         let [a, b] = [pair[0].0.patch, pair[1].0.patch];
         let ends = [a, b].map(|p| view.at(&setting.patches[p].centre));

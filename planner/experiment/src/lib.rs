@@ -9,7 +9,7 @@ mod setting;
 mod tables;
 
 pub use figures::{FigureError, write as draw};
-pub use methods::{Figures, Run, Task, V_MAX, by_cost, plan};
+pub use methods::{MethodRun, PathFigures, Task, V_MAX, by_cost, plan};
 pub use paper::{Published, cannot_hold, cell, samples};
 pub use report::{
     Cell, METHODS, Plan, Report, SettingFigures, Straight, Tracked, look_between, run, tracked,

@@ -38,7 +38,7 @@ pub struct Task {
 /// The figures of a run, over the motions between the poses of the tour: the way from the start
 /// posture to the first is left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
+pub struct PathFigures {
     /// Euclidean distance from patch to patch. \[m\]
     pub distance_m: f64,
     /// Sum of all joint displacements (Eq. 1). \[rad\]
@@ -59,18 +59,18 @@ pub struct Figures {
 
 /// A coverage path.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct MethodRun {
     /// Poses with their joint vectors, in visiting order.
     pub path: Vec<(Stop, JointVector)>,
     /// Its figures.
-    pub figures: Figures,
+    pub figures: PathFigures,
 }
 
 /// Plans the task.
 ///
 /// # Errors
 /// A cost that is not a number.
-pub fn plan(setting: &Setting, task: &Task) -> Result<Run, FormulationError> {
+pub fn plan(setting: &Setting, task: &Task) -> Result<MethodRun, FormulationError> {
     match task.cost {
         CostKind::Effort => by_cost(setting, task, &Effort),
         CostKind::Time => by_cost(setting, task, &time(setting)),
@@ -87,7 +87,11 @@ fn time(setting: &Setting) -> TaskTime {
 ///
 /// # Errors
 /// A cost that is not a number.
-pub fn by_cost<C: Cost>(setting: &Setting, task: &Task, cost: &C) -> Result<Run, FormulationError> {
+pub fn by_cost<C: Cost>(
+    setting: &Setting,
+    task: &Task,
+    cost: &C,
+) -> Result<MethodRun, FormulationError> {
     let (begin, processor) = (Instant::now(), processor_time());
     let metric = Metric::new(cost, setting.arm.continuous(), setting.arm.dof(), 0.0);
     let graph = &setting.graph;
@@ -158,8 +162,9 @@ pub fn by_cost<C: Cost>(setting: &Setting, task: &Task, cost: &C) -> Result<Run,
     let calculation_s = begin.elapsed().as_secs_f64();
     let processor_s = processor_time() - processor;
     let samples = clusters.iter().map(|c| c.samples().len()).sum();
-    let figures = Figures { calculation_s, processor_s, samples, bytes, ..measure(setting, &path) };
-    Ok(Run { path, figures })
+    let figures =
+        PathFigures { calculation_s, processor_s, samples, bytes, ..measure(setting, &path) };
+    Ok(MethodRun { path, figures })
 }
 
 /// What this process has used. \[s\]
@@ -169,9 +174,9 @@ fn processor_time() -> f64 {
 }
 
 /// The figures of a path that lie in it alone.
-fn measure(setting: &Setting, path: &[(Stop, JointVector)]) -> Figures {
+fn measure(setting: &Setting, path: &[(Stop, JointVector)]) -> PathFigures {
     let (continuous, time) = (setting.arm.continuous(), time(setting));
-    let mut figures = Figures::default();
+    let mut figures = PathFigures::default();
     for pair in path.windows(2) {
         let [(a, p), (b, q)] = [pair[0], pair[1]];
         let moved = continuous.displacement(&p, &q);

@@ -11,7 +11,7 @@ use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::Robot;
 use serde::{Deserialize, Serialize};
 
-use crate::methods::{Figures, Run, Task, V_MAX, plan};
+use crate::methods::{MethodRun, PathFigures, Task, V_MAX, plan};
 use crate::setting::Setting;
 use crate::{Object, Published, Quantity, tables};
 
@@ -88,7 +88,7 @@ pub struct Cell {
     /// Method.
     pub method: Method,
     /// Its runs.
-    pub runs: Vec<Figures>,
+    pub runs: Vec<PathFigures>,
 }
 
 /// A path of the straight model looked at between its poses.
@@ -180,7 +180,7 @@ pub fn run(
     setting: &Setting,
     plan_of: &Plan,
     progress: &dyn Progress,
-) -> Result<(Report, Vec<(Method, Run)>), FormulationError> {
+) -> Result<(Report, Vec<(Method, MethodRun)>), FormulationError> {
     let most = plan_of.samples.iter().copied().max().unwrap_or(1);
     let mut cells = Vec::new();
     let mut shown = Vec::new();
@@ -242,7 +242,7 @@ const STEPS: usize = 10;
 pub fn look_between(
     setting: &Setting,
     robot: &Robot,
-    run: &Run,
+    run: &MethodRun,
 ) -> Result<Straight, PipelineError> {
     let world = World::new(
         robot,
@@ -254,7 +254,7 @@ pub fn look_between(
     )?;
     let contact = setting.tool.contact_in_tip();
     let continuous = setting.arm.continuous();
-    let free = |run: &Run, k: usize| world.is_free(&run.path[k].1, ToolContact::Allowed);
+    let free = |run: &MethodRun, k: usize| world.is_free(&run.path[k].1, ToolContact::Allowed);
     let mut straight = Straight { poses: run.path.len(), ..Straight::default() };
     straight.colliding_poses = (0..run.path.len()).filter(|&k| !free(run, k)).count();
     let mut off = Vec::new();

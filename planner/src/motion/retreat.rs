@@ -47,7 +47,7 @@ pub fn retract(
     let home = -contact.translation.vector.component_mul(&Vector3::new(1.0, 1.0, 0.0)).normalize();
     [normal, normal + up, normal + home, normal + up + home]
         .into_iter()
-        .filter_map(|way| way.try_normalize(0.1))
+        .filter_map(|direction| direction.try_normalize(0.1))
         .find_map(|away| back_off(world, arm, q, &away, distance))
 }
 
@@ -65,9 +65,9 @@ fn back_off(
     let mut left = None;
     let steps = (distance / LIFT_STEP).ceil().max(1.0) as usize;
     for step in 1..=steps {
-        let way = distance * step as f64 / steps as f64;
+        let lifted = distance * step as f64 / steps as f64;
         let mut target = start;
-        target.translation.vector += away * way;
+        target.translation.vector += away * lifted;
         let last = path[path.len() - 1];
         let rule = if left.is_some() { ToolContact::Forbidden } else { ToolContact::Allowed };
         let next = reach_for(arm, &target, &last)

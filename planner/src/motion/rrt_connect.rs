@@ -70,8 +70,8 @@ pub fn rrt_connect(
         if let Some(new) = trees[growing].extend(&sample, options.step, free) {
             let target = trees[growing].nodes[new].0;
             if let Some(met) = trees[1 - growing].connect(&target, options.step, free) {
-                let mut path = trees[growing].way_to(new);
-                let mut rest = trees[1 - growing].way_to(met);
+                let mut path = trees[growing].path_to(new);
+                let mut rest = trees[1 - growing].path_to(met);
                 rest.reverse();
                 // Both trees hold the node where they meet.
                 path.extend(&rest[1..]);
@@ -114,7 +114,7 @@ impl Tree {
         self.step_from(nearest.1, target, step, free)
     }
 
-    /// Steps towards `target` until it is reached; its node, unless something is in the way.
+    /// Steps towards `target` until it is reached; its node, unless something is in the path.
     fn connect(
         &mut self,
         target: &JointVector,
@@ -145,15 +145,15 @@ impl Tree {
     }
 
     /// From the root to a node.
-    fn way_to(&self, node: usize) -> Vec<JointVector> {
-        let mut way = vec![self.nodes[node].0];
+    fn path_to(&self, node: usize) -> Vec<JointVector> {
+        let mut path = vec![self.nodes[node].0];
         let mut at = node;
         while at != self.nodes[at].1 {
             at = self.nodes[at].1;
-            way.push(self.nodes[at].0);
+            path.push(self.nodes[at].0);
         }
-        way.reverse();
-        way
+        path.reverse();
+        path
     }
 }
 

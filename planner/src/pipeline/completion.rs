@@ -106,7 +106,7 @@ impl<C: Cost> Completion<'_, C> {
         let Planning { cell, job, start, .. } = *self.planning;
         let patch = attempt.patches.len() - 1;
         let mover = Mover::new(cell, &attempt.graph, &[], self.cost, start, job.seed);
-        let trip = Trip {
+        let insertion = Insertion {
             planning: self.planning,
             cost: self.cost,
             mover,
@@ -115,7 +115,8 @@ impl<C: Cost> Completion<'_, C> {
             patch,
             values: redundancies(cell.arm.ik().redundancy_range(), job.ik_samples),
         };
-        let (at, there, after) = trip.along_the_surface().or_else(|| trip.through_free_space())?;
+        let (at, there, after) =
+            insertion.along_the_surface().or_else(|| insertion.through_free_space())?;
         let visits = &mut attempt.sequence.visits;
         match after {
             After::Back(back) => {
@@ -133,7 +134,7 @@ impl<C: Cost> Completion<'_, C> {
     }
 }
 
-/// How the arm goes on from a side trip.
+/// How the arm goes on from a side insertion.
 enum After {
     /// To the stop that it came from.
     Back(Leg),
@@ -144,7 +145,7 @@ enum After {
 }
 
 /// The search for motions to one patch.
-struct Trip<'a, C> {
+struct Insertion<'a, C> {
     planning: &'a Planning<'a>,
     cost: &'a C,
     mover: Mover<'a, C>,
@@ -156,7 +157,7 @@ struct Trip<'a, C> {
     values: Vec<f64>,
 }
 
-impl<C: Cost> Trip<'_, C> {
+impl<C: Cost> Insertion<'_, C> {
     /// The cheapest way from a stop nearby and back: the place of the new visit, the visit, and
     /// the way on.
     fn along_the_surface(&self) -> Option<(usize, Visit, After)> {

@@ -15,8 +15,8 @@ impl Curve {
     /// The straight line between two positions.
     #[must_use]
     pub fn line(a: &JointVector, b: &JointVector, seconds: f64) -> Self {
-        let way = *b - *a;
-        Self { seconds, terms: [*a, way, JointVector::ZERO, JointVector::ZERO], end: *b }
+        let difference = *b - *a;
+        Self { seconds, terms: [*a, difference, JointVector::ZERO, JointVector::ZERO], end: *b }
     }
 
     /// The cubic through two positions with given velocities (Hermite).
@@ -28,9 +28,9 @@ impl Curve {
     ) -> Self {
         let first = JointVector::from_fn(|j| va[j] * seconds);
         let last = JointVector::from_fn(|j| vb[j] * seconds);
-        let way = *b - *a;
-        let second = JointVector::from_fn(|j| 3.0 * way[j] - 2.0 * first[j] - last[j]);
-        let third = JointVector::from_fn(|j| first[j] + last[j] - 2.0 * way[j]);
+        let difference = *b - *a;
+        let second = JointVector::from_fn(|j| 3.0 * difference[j] - 2.0 * first[j] - last[j]);
+        let third = JointVector::from_fn(|j| first[j] + last[j] - 2.0 * difference[j]);
         Self { seconds, terms: [*a, first, second, third], end: *b }
     }
 
@@ -40,7 +40,7 @@ impl Curve {
         self.seconds
     }
 
-    /// The position at a share 0…1 of the time; the ends to the bit. \[rad\] or \[m\]
+    /// The position at a share 0…1 of the time; the ends exactly. \[rad\] or \[m\]
     #[must_use]
     pub fn at(&self, share: f64) -> JointVector {
         if share >= 1.0 {
@@ -100,14 +100,14 @@ impl Curve {
 
     /// The farthest that a joint can move within it. \[rad\] or \[m\]
     #[must_use]
-    pub fn way(&self) -> f64 {
+    pub fn reach(&self) -> f64 {
         (0..MAX_DOF).map(|j| self.top_speed(j) * self.seconds).fold(0.0, f64::max)
     }
 
     /// Into how many equal parts it is cut so that no joint moves farther than `step` in one.
     #[must_use]
     pub fn steps(&self, step: f64) -> usize {
-        ((self.way() / step).ceil() as usize).max(1)
+        ((self.reach() / step).ceil() as usize).max(1)
     }
 
     fn slope(&self, joint: usize, share: f64) -> f64 {

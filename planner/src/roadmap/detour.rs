@@ -13,7 +13,7 @@ use nullsweep_collision::ToolContact;
 use nullsweep_robot::{Branch, JointVector};
 
 use super::path::ToolPath;
-use super::track::{Place, Run, Track, arrives, is_step};
+use super::track::{Follower, Place, Track, arrives, is_step};
 use crate::workcell::{Sample, Workcell};
 
 /// Distance of the redundancy values that are tried. \[rad\]
@@ -145,15 +145,15 @@ impl<'a> Search<'a> {
         let mut dirty = 1;
         loop {
             self.label(dirty);
-            let way = self.cheapest()?;
-            if let Some(station) = self.collision(&way) {
+            let route = self.cheapest()?;
+            if let Some(station) = self.collision(&route) {
                 dirty = station;
                 continue;
             }
-            match self.track(&way) {
+            match self.track(&route) {
                 Ok(track) => return Some(track),
                 Err(station) => {
-                    self.blocked.insert((station, way[station], way[station + 1]));
+                    self.blocked.insert((station, route[station], route[station + 1]));
                     if self.blocked.len() > BLOCKED_BETWEEN {
                         return None;
                     }
@@ -165,7 +165,7 @@ impl<'a> Search<'a> {
 
     /// Finds the best way to each node, from station `dirty` on.
     fn label(&mut self, dirty: usize) {
-        let run = Run::new(self.cell, self.path, &self.from[0]);
+        let run = Follower::new(self.cell, self.path, &self.from[0]);
         for node in &mut self.layers[0] {
             node.cost = 0.0;
         }
@@ -206,11 +206,11 @@ impl<'a> Search<'a> {
                 }
                 let Some(&q) = node.q() else { continue };
                 for (at, cost, _, from) in near {
-                    let way: f64 = q.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum();
+                    let length: f64 = q.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum();
                     let is_open =
                         || is_step(from, &q) && !self.blocked.contains(&(station - 1, at, index));
-                    if cost + way < node.cost && is_open() {
-                        (node.cost, node.before) = (cost + way, at);
+                    if cost + length < node.cost && is_open() {
+                        (node.cost, node.before) = (cost + length, at);
                     }
                 }
             }
@@ -222,21 +222,21 @@ impl<'a> Search<'a> {
         let last = self.layers.len() - 1;
         let ends = self.layers[last].iter().enumerate().filter(|(_, node)| node.cost.is_finite());
         let (mut at, _) = ends.min_by(|(_, a), (_, b)| a.cost.total_cmp(&b.cost))?;
-        let mut way = vec![0; last + 1];
+        let mut route = vec![0; last + 1];
         for station in (0..=last).rev() {
-            way[station] = at;
+            route[station] = at;
             at = self.layers[station][at].before;
         }
-        Some(way)
+        Some(route)
     }
 
     /// Looks at the nodes of a way that were not looked at yet, first where most collisions were
     /// found; the station of one that collides.
-    fn collision(&mut self, way: &[usize]) -> Option<usize> {
-        let mut stations: Vec<usize> = (0..way.len()).collect();
+    fn collision(&mut self, route: &[usize]) -> Option<usize> {
+        let mut stations: Vec<usize> = (0..route.len()).collect();
         stations.sort_by_key(|&station| std::cmp::Reverse(self.hits[station]));
         stations.into_iter().find(|&station| {
-            let node = &mut self.layers[station][way[station]];
+            let node = &mut self.layers[station][route[station]];
             let State::Solved(q) = node.state else { return false };
             let is_free = self.cell.world.is_free(&q, ToolContact::Allowed);
             node.state = if is_free { State::Free(q) } else { State::Out };
@@ -246,10 +246,10 @@ impl<'a> Search<'a> {
     }
 
     /// The track through the nodes, or the station after which it is blocked.
-    fn track(&self, way: &[usize]) -> Result<Track, usize> {
-        let node = |station: usize| &self.layers[station][way[station]];
-        let mut run = Run::new(self.cell, self.path, &self.from[way[0]]);
-        for station in 1..way.len() {
+    fn track(&self, route: &[usize]) -> Result<Track, usize> {
+        let node = |station: usize| &self.layers[station][route[station]];
+        let mut run = Follower::new(self.cell, self.path, &self.from[route[0]]);
+        for station in 1..route.len() {
             let redundancy = node(station).redundancy;
             let q = *node(station).q().ok_or(station - 1)?;
             let place = Place { share: 1.0, q, redundancy, pose: self.poses[station] };
@@ -257,7 +257,7 @@ impl<'a> Search<'a> {
         }
         match self.cell.world.unproven(&run.track.joints, ToolContact::Allowed) {
             None => Ok(run.track),
-            Some(knot) => Err(run.station_at(knot).min(way.len() - 2)),
+            Some(knot) => Err(run.station_at(knot).min(route.len() - 2)),
         }
     }
 }

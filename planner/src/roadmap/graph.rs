@@ -91,12 +91,12 @@ pub fn build(
             let known = before.and_then(|graph| graph.known(a, b));
             let edge = known.unwrap_or_else(|| {
                 let edge = Edge::between(surface, patches, a, b, config)?;
-                let mut ways: Vec<Way> =
-                    TURNS.iter().map(|turn| Way::new(cell, patches, &edge, *turn)).collect();
-                let even = ways.iter_mut().position(|way| way.is_followed(cell, &values));
+                let mut turned: Vec<TurnedEdge> =
+                    TURNS.iter().map(|turn| TurnedEdge::new(cell, patches, &edge, *turn)).collect();
+                let even = turned.iter_mut().position(|edge| edge.is_followed(cell, &values));
                 let found =
-                    even.or_else(|| ways.iter().position(|way| way.has_detour(cell, &values)))?;
-                Some(ways.swap_remove(found).edge)
+                    even.or_else(|| turned.iter().position(|edge| edge.has_detour(cell, &values)))?;
+                Some(turned.swap_remove(found).edge)
             });
             progress.tick();
             edge
@@ -145,7 +145,7 @@ fn neighbour_pairs(
 }
 
 /// An edge with the pad turned from it.
-struct Way {
+struct TurnedEdge {
     edge: Edge,
     path: ToolPath,
     /// Contact pose and heading at both ends.
@@ -154,7 +154,7 @@ struct Way {
     from: Vec<Sample>,
 }
 
-impl Way {
+impl TurnedEdge {
     /// `turn` in \[°\].
     fn new(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, turn: f64) -> Self {
         let edge = Edge { turn: turn.to_radians(), ..edge.clone() };

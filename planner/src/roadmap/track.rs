@@ -67,7 +67,7 @@ impl Workcell<'_> {
         if from.branch != to.branch {
             return Err(blocked(last, TrackFailure::Elsewhere));
         }
-        let mut run = Run::new(*self, path, from);
+        let mut run = Follower::new(*self, path, from);
         for station in 1..=last {
             let (redundancy, pose) = (redundancy(station), path.pose(station));
             run.solve(&pose, redundancy, &run.last.q)
@@ -110,7 +110,7 @@ pub(crate) struct Place {
 }
 
 /// The way along a tool path on one branch, from station to station.
-pub(crate) struct Run<'a> {
+pub(crate) struct Follower<'a> {
     cell: Workcell<'a>,
     path: &'a ToolPath,
     branch: Branch,
@@ -122,7 +122,7 @@ pub(crate) struct Run<'a> {
     pub(crate) track: Track,
 }
 
-impl<'a> Run<'a> {
+impl<'a> Follower<'a> {
     pub(crate) fn new(cell: Workcell<'a>, path: &'a ToolPath, from: &Sample) -> Self {
         let contact_in_tip = cell.tool.contact_in_tip();
         let (q, redundancy, pose) = (from.q, from.redundancy, path.pose(0));

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// Every figure of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Figures {
+pub struct TaskFigures {
     /// Poses of the task.
     pub poses: usize,
     /// Poses that the plan meets.

@@ -2,7 +2,7 @@
 //! vectors, the arm meets every pose within its tolerance with the least joint movement.
 //!
 //! The order is free and the path open, as in Wang and Gleicher's arm-coverage planner (ICRA
-//! 2025), whose measures [`Figures`] holds beside ours.
+//! 2025), whose measures [`TaskFigures`] holds beside ours.
 
 mod assemble;
 mod config;
@@ -16,6 +16,6 @@ mod space;
 
 pub use config::{TaskConfig, tip_tool};
 pub use error::TaskError;
-pub use figures::Figures;
+pub use figures::TaskFigures;
 pub use read::{PosesError, Tolerance, read};
-pub use run::{Outcome, run};
+pub use run::{TaskOutcome, run};

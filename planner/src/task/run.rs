@@ -9,7 +9,7 @@ use nullsweep_robot::{JointVector, Robot};
 use super::assemble::assemble;
 use super::config::TaskConfig;
 use super::error::TaskError;
-use super::figures::Figures;
+use super::figures::TaskFigures;
 use super::route::Route;
 use super::search::search;
 use super::space::{Point, RESIDUAL, Space};
@@ -22,11 +22,11 @@ use crate::workcell::Scene;
 
 /// The plan and its figures.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct TaskOutcome {
     /// The plan; knots at poses carry the pose's index as their patch.
     pub plan: Plan,
     /// The figures.
-    pub figures: Figures,
+    pub figures: TaskFigures,
     /// What verification found.
     pub verification: Verification,
 }
@@ -40,7 +40,7 @@ pub fn run(
     poses: &[Isometry3<f64>],
     config: &TaskConfig,
     progress: &dyn Progress,
-) -> Result<Outcome, TaskError> {
+) -> Result<TaskOutcome, TaskError> {
     let started = Instant::now();
     let held: Vec<(&str, f64)> = config.held.iter().map(|(n, v)| (n.as_str(), *v)).collect();
     let arm = robot.arm(&config.arm)?.with_held(&held)?;
@@ -68,7 +68,7 @@ pub fn run(
     let mut off: Vec<f64> = straight.iter().map(|(a, b)| deviation(&space, a, b)).collect();
     off.sort_by(f64::total_cmp);
     let excess = |&pose: &usize| space.excess(&poses[pose], &route.points[pose].tool).amax();
-    let figures = Figures {
+    let figures = TaskFigures {
         poses: poses.len(),
         met: route.order.iter().filter(|p| excess(p) < 10.0 * RESIDUAL).count(),
         movement_rad: straight.iter().map(|(a, b)| a.q.distance(&b.q)).sum(),
@@ -83,7 +83,7 @@ pub fn run(
         verify_time_s: started.elapsed().as_secs_f64(),
         notes: world.notes().to_vec(),
     };
-    Ok(Outcome { plan, figures, verification })
+    Ok(TaskOutcome { plan, figures, verification })
 }
 
 fn pairs(route: &Route) -> impl Iterator<Item = (&Point, &Point)> {

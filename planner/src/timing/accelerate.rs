@@ -5,9 +5,9 @@ use nullsweep_collision::ToolContact;
 use nullsweep_robot::JointVector;
 
 use super::Limits;
-use super::run::{Piece, Run};
 use super::sampled::{Timed, braked, timed};
 use super::smooth::{cut, smooth};
+use super::smooth_path::{Piece, SmoothPath};
 use crate::plan::{BLEND_TOLERANCE, Plan, PlanKnot, Profile};
 use crate::sweep::distance_to_segment;
 use crate::workcell::Workcell;
@@ -38,7 +38,7 @@ pub struct Rest {
 
 impl Rest {
     /// Brakes on the plan's path from its knot on. While the plan itself leaves no reserve for
-    /// braking, it is followed to the bit. `None` if the plan has no such knot.
+    /// braking, it is followed exactly. `None` if the plan has no such knot.
     #[must_use]
     pub fn after(plan: &Plan, knot: usize, limits: &Limits) -> Option<Self> {
         let knots = plan.knots.get(knot..)?;
@@ -60,8 +60,8 @@ impl Rest {
                         let own = self::knot(ahead, t);
                         PlanKnot { time_ns: own.time_ns + start, ..own }
                     });
-                    let way = followed().chain(braking).collect();
-                    return Some(Self { knots: way, at: knot + m + more });
+                    let motion = followed().chain(braking).collect();
+                    return Some(Self { knots: motion, at: knot + m + more });
                 }
                 more = (more + 1).max(more * 5 / 4);
             }
@@ -85,8 +85,8 @@ const RESERVE: f64 = 0.95;
 
 /// The path of a plan's cubics with their time as parameter: two quadratics for each, which meet
 /// them in position and velocity at both ends and stay within their accelerations.
-fn along(knots: &[PlanKnot]) -> Run {
-    let mut run = Run::default();
+fn along(knots: &[PlanKnot]) -> SmoothPath {
+    let mut run = SmoothPath::default();
     for (i, pair) in knots.windows(2).enumerate() {
         let (a, b) = (&pair[0], &pair[1]);
         let seconds = (b.time_ns - a.time_ns) as f64 * 1e-9;

@@ -3,15 +3,15 @@
 mod accelerate;
 mod bang_bang;
 mod optimal;
-mod run;
 mod sampled;
 mod smooth;
+mod smooth_path;
 
 pub use accelerate::{Rest, accelerate};
 pub use bang_bang::{bang_bang, segment_ns};
-pub use run::{Piece, Run};
 pub use sampled::{Timed, timed};
 pub use smooth::smooth;
+pub use smooth_path::{Piece, SmoothPath};
 
 use nullsweep_robot::{Arm, JointVector};
 

@@ -4,7 +4,7 @@ use nullsweep_robot::{JointVector, MAX_DOF};
 
 use super::Limits;
 use super::optimal::{Interval, squared_speeds};
-use super::run::{Piece, Run};
+use super::smooth_path::{Piece, SmoothPath};
 use crate::plan::Curve;
 
 /// A moment of the motion.
@@ -36,7 +36,7 @@ const HEADROOM: f64 = 1.0 - 2e-5;
 /// Between two knots the joints follow the cubic through their positions and velocities, with
 /// every velocity and acceleration within the limits.
 #[must_use]
-pub fn timed(runs: &[Run], limits: &Limits) -> Vec<Timed> {
+pub fn timed(runs: &[SmoothPath], limits: &Limits) -> Vec<Timed> {
     let mut knots: Vec<Timed> = Vec::new();
     for run in runs {
         let from = knots.last().map_or(0, |k| k.time_ns);
@@ -51,7 +51,7 @@ pub fn timed(runs: &[Run], limits: &Limits) -> Vec<Timed> {
 /// A run that is under way at its start, with ṡ = 1, braked to rest with a share of the limits.
 /// `None` where that does not go.
 #[must_use]
-pub(super) fn braked(run: &Run, limits: &Limits, share: f64) -> Option<Vec<Timed>> {
+pub(super) fn braked(run: &SmoothPath, limits: &Limits, share: f64) -> Option<Vec<Timed>> {
     run_knots(run, limits, share, 1.0, 0)
 }
 
@@ -63,7 +63,7 @@ struct Cell {
 }
 
 fn run_knots(
-    run: &Run,
+    run: &SmoothPath,
     limits: &Limits,
     share: f64,
     start: f64,
@@ -118,15 +118,15 @@ fn run_knots(
 }
 
 /// The grid: every piece in equal parts.
-fn cells(run: &Run) -> Vec<Cell> {
+fn cells(run: &SmoothPath) -> Vec<Cell> {
     let mut cells = Vec::new();
     let last = run.pieces.len().saturating_sub(1);
     for (index, piece) in run.pieces.iter().enumerate() {
         let end = piece.slope_at(piece.length);
-        let way = (0..MAX_DOF)
+        let length = (0..MAX_DOF)
             .map(|j| piece.slope[j].abs().max(end[j].abs()) * piece.length)
             .fold(0.0, f64::max);
-        let mut count = (way / STEP).ceil().max(1.0) as usize;
+        let mut count = (length / STEP).ceil().max(1.0) as usize;
         if index == 0 || index == last {
             count = count.max(INTERVALS_AT_REST);
         }

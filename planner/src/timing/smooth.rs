@@ -3,7 +3,7 @@
 use nullsweep_robot::{JointVector, MAX_DOF};
 use rayon::prelude::*;
 
-use super::run::{Piece, Run, distance};
+use super::smooth_path::{Piece, SmoothPath, distance};
 
 /// Halvings of a blend until the arm stops in the corner instead.
 const MAX_HALVINGS: u32 = 12;
@@ -21,7 +21,7 @@ const SHORTEST: f64 = 1e-5;
 pub fn smooth(
     points: &[JointVector],
     fits: &(dyn Fn(usize, &[Piece; 2]) -> bool + Sync),
-) -> Vec<Run> {
+) -> Vec<SmoothPath> {
     let legs: Vec<f64> = points.windows(2).map(|w| distance(&w[0], &w[1])).collect();
     let blends: Vec<Option<[Piece; 2]>> = (0..points.len())
         .into_par_iter()
@@ -45,7 +45,7 @@ pub fn smooth(
         .collect();
 
     let mut runs = Vec::new();
-    let mut run = Run::default();
+    let mut run = SmoothPath::default();
     for i in 0..legs.len() {
         // From the end of the blend before to the start of the next one.
         let from = blends[i].as_ref().map_or(0.0, |b| b[1].length);

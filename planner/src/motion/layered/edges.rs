@@ -1,6 +1,6 @@
 //! What is known of the motions between two layers.
 
-/// Jumps made between two layers after which the others are put off: they are dear, and their cost
+/// Jumps made between two layers after which the others are put off: they are expensive, and their cost
 /// hardly depends on the sample.
 const MAX_JUMPS: usize = 3;
 /// Failed jumps between two layers after which one of them is left out.
@@ -34,7 +34,7 @@ pub(super) struct Edges {
     /// The cost of the straight joint line.
     straight: Vec<f32>,
     kind: Vec<Kind>,
-    /// What a jump costs besides its way.
+    /// What a jump costs besides its motion.
     lift: f32,
     /// Ratios of true to straight cost seen here, of tracks, of doubtful ones and of jumps: their
     /// sum and number.
@@ -90,9 +90,9 @@ impl Edges {
     pub(super) fn learn(&mut self, a: usize, b: usize, cost: f64) {
         let at = a * self.width + b;
         let kind = self.kind[at];
-        let way = cost as f32 - if kind == Kind::Jump { self.lift } else { 0.0 };
+        let motion = cost as f32 - if kind == Kind::Jump { self.lift } else { 0.0 };
         let (sum, seen) = &mut self.ratios[kind as usize];
-        *sum += way / self.straight[at].max(1e-6);
+        *sum += motion / self.straight[at].max(1e-6);
         *seen += 1.0;
         self.doubtful[0] += usize::from(kind == Kind::Doubtful);
         self.jumps += usize::from(kind == Kind::Jump);

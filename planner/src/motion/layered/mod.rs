@@ -3,7 +3,7 @@
 //! One layer for each tool pose of the tour, one node for each sample of the inverse
 //! kinematics; the arm's current joint vector is the source, the sink is artificial. The cost of
 //! an edge is known exactly only after its motion has been made – tracked along the surface, or a
-//! jump through free space – which is dear, while the cost of the straight joint line is cheap and
+//! jump through free space – which is expensive, while the cost of the straight joint line is cheap and
 //! never above it. So the search is lazy: the path that is shortest under estimates is found, the
 //! motions on it are made, their true costs (or their failure) replace the estimates, and so on.
 //! An estimate is the straight cost times the mean ratio of true to straight cost seen so far

@@ -67,8 +67,8 @@ impl<'a, C: Cost> Layers<'a, C> {
         for p in (0..forward.len()).rev() {
             let samples = self.clusters[p].samples();
             let value = |i: usize| {
-                let way = after.map_or(0.0, |next| self.metric.between(&samples[i], next));
-                f64::from(forward[p][i]) + way
+                let step = after.map_or(0.0, |next| self.metric.between(&samples[i], next));
+                f64::from(forward[p][i]) + step
             };
             let values = (0..samples.len()).map(|i| (value(i), i));
             let (_, best) = values.fold((f64::INFINITY, 0), |m, v| if v.0 < m.0 { v } else { m });
@@ -86,12 +86,12 @@ impl<'a, C: Cost> Layers<'a, C> {
         let at = |p: usize| &self.clusters[p].samples()[choice[p]];
         (0..choice.len())
             .map(|p| {
-                let way = match (p.checked_sub(1), &self.source) {
+                let step = match (p.checked_sub(1), &self.source) {
                     (Some(b), _) => self.metric.between(at(b), at(p)),
                     (None, Some(source)) => self.metric.between(&source.samples()[0], at(p)),
                     (None, None) => 0.0,
                 };
-                way + f64::from(self.extra[p])
+                step + f64::from(self.extra[p])
             })
             .sum()
     }
@@ -156,11 +156,12 @@ mod tests {
                     .samples()
                     .iter()
                     .map(|to| {
-                        let ways = clusters[p - 1].samples().iter().zip(&plain);
-                        ways.map(|(from, label)| {
-                            label + metric.between(from, to) + f64::from(layers.extra[p])
-                        })
-                        .fold(f64::INFINITY, f64::min)
+                        let steps = clusters[p - 1].samples().iter().zip(&plain);
+                        steps
+                            .map(|(from, label)| {
+                                label + metric.between(from, to) + f64::from(layers.extra[p])
+                            })
+                            .fold(f64::INFINITY, f64::min)
                     })
                     .collect();
             }

@@ -38,7 +38,7 @@ impl Cluster {
     }
 
     /// One joint vector, where the arm is: of no branch, so that every way from it counts as a
-    /// change of branch where that is dear.
+    /// change of branch where that is expensive.
     #[must_use]
     pub fn at(q: JointVector) -> Self {
         Self::new(vec![Sample { q, branch: Branch(u8::MAX), redundancy: 0.0, heading: 0.0 }])

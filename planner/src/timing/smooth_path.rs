@@ -22,7 +22,7 @@ pub struct Piece {
 /// Pieces that meet in position and slope. The arm is at rest at its end, and at its start unless
 /// it is told otherwise.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Run {
+pub struct SmoothPath {
     /// In their order.
     pub pieces: Vec<Piece>,
 }
@@ -53,7 +53,7 @@ impl Piece {
     pub fn part(&self, from: f64, to: f64) -> Self {
         let (a, b) = (from * self.length, to * self.length);
         let mix = |share: f64| self.source[0] + share * (self.source[1] - self.source[0]);
-        // The ends of a piece keep their source to the bit.
+        // The ends of a piece keep their source exactly.
         let source = [
             if from == 0.0 { self.source[0] } else { mix(from) },
             if to == 1.0 { self.source[1] } else { mix(to) },
