@@ -5,10 +5,12 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use nullsweep_collision::{Obstacle, ObstacleShape, Options, ToolContact, World};
+use nullsweep_collision::{Obstacle, Options, ToolContact, World};
 use nullsweep_planner::roadmap::{Edge, ToolPath, Track, TrackFailure};
 use nullsweep_planner::workcell::{Sample, Workcell, contact_pose, direction, heading_of};
-use nullsweep_robot::{Arm, ArmSpec, JointVector, RedundantJoint, Robot, Side, Solutions, Tool};
+use nullsweep_robot::{
+    Arm, ArmSpec, Geometry, JointVector, RedundantJoint, Robot, Side, Solutions, Tool,
+};
 use nullsweep_surface::SurfacePoint;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -80,7 +82,7 @@ fn setting(robot: &Robot, spec: &ArmSpec, tool: Tool, depth: f64, height: f64) -
     let boxes: Vec<Obstacle> = (0..30)
         .map(|n| Obstacle {
             name: format!("box {n}"),
-            shape: ObstacleShape::Box { half_extents: Vector3::repeat(0.01) },
+            shape: Geometry::Box { half_extents: Vector3::repeat(0.01) }.into(),
             pose: Isometry3::translation(
                 depth - rng.random_range(0.15..0.5),
                 rng.random_range(-0.8..0.5),

@@ -6,9 +6,10 @@ use std::str::FromStr;
 use anyhow::{Context, ensure};
 use clap::Args;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use nullsweep_collision::{Obstacle, ObstacleShape};
+use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
+use nullsweep_robot::Geometry;
 use nullsweep_surface::{
     CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan, scan, simulate,
 };
@@ -177,7 +178,7 @@ fn table_under(scan: &Scan, height: f64) -> Obstacle {
     }
     Obstacle {
         name: "table".into(),
-        shape: ObstacleShape::Box { half_extents: (high - low) * 0.5 },
+        shape: Geometry::Box { half_extents: (high - low) * 0.5 }.into(),
         pose: Isometry3::from(nalgebra::center(&low, &high).coords),
         carries_robot: false,
     }

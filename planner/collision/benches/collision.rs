@@ -112,12 +112,6 @@ fn working_exact(bencher: Bencher<'_, '_>) {
 }
 
 #[divan::bench]
-fn working_clearance(bencher: Bencher<'_, '_>) {
-    let s = &*SETTING;
-    over(bencher, &s.working, |q| s.world.clearance(q, ToolContact::Allowed) > 0.0);
-}
-
-#[divan::bench]
 fn asked_is_free(bencher: Bencher<'_, '_>) {
     let s = &*SETTING;
     over(bencher, &s.asked, |q| s.world.is_free(q, ToolContact::Allowed));

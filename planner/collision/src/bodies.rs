@@ -58,9 +58,9 @@ impl Body {
         Frame { rotation: self.rest.rotation + turned, ..self.rest }
     }
 
-    /// How far the body slides from its rest place at most, its joint within ±`travel`. \[m\]
-    pub(crate) fn most_slide(&self, travel: f64) -> f64 {
-        self.multiplier.abs() * travel + self.offset.abs()
+    /// How far the body slides from its rest place at most, its joint within ±`stroke`. \[m\]
+    pub(crate) fn most_slide(&self, stroke: f64) -> f64 {
+        self.multiplier.abs() * stroke + self.offset.abs()
     }
 }
 
@@ -149,6 +149,12 @@ impl Bodies {
             .expect("the last joint's link is a body");
         let tip = inside(Some(tip_body), &arm.tip_pose(&reference));
         Ok(Self { bodies, links, tip, tip_body })
+    }
+
+    /// The body that carries a link (none: the tip frame), and the link's frame in there; no body: it
+    /// does not move with the arm.
+    pub(crate) fn carrier(&self, link: Option<usize>) -> (Option<usize>, Frame) {
+        link.map_or((Some(self.tip_body), self.tip), |link| self.links[link])
     }
 
     /// The body frames in the root frame, in the first `bodies.len()` entries.

@@ -2,33 +2,41 @@
 
 use nalgebra::Vector3;
 use nullsweep_robot::JointVector;
-use parry3d_f64::query::{DefaultQueryDispatcher, QueryDispatcher};
 use parry3d_f64::shape::SharedShape;
 
 use crate::bodies::MAX_BODIES;
 use crate::frame::Frame;
 use crate::motion::Slack;
-use crate::proof::Check;
-use crate::solid::Solid;
+use crate::moving::Moving;
+use crate::rules::{Hit, TOLERANCE, ToolContact};
+use crate::solid::{Solid, gjk_distance};
 use crate::spheres::Sphere;
-use crate::world::{Fixed, Moving, World};
-use crate::{Hit, ToolContact};
-
-/// What the fast check asks for beyond every margin, so that its rounding never makes it pass what
-/// the exact check rejects. \[m\]
-pub(crate) const TOLERANCE: f64 = 1e-8;
+use crate::world::World;
 
 /// Spheres looked at before a pair of shapes goes to GJK, which costs about as much.
 const SPHERES: usize = 24;
 
+/// One thing to check, by its index in the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Check {
+    /// A moving shape against the scan.
+    Scan(usize),
+    /// A moving shape against the fixed shapes.
+    Fixed(usize),
+    /// A pair of moving shapes.
+    Pair(usize),
+}
+
 impl World {
-    /// Whether everything that moves with the arm keeps its margins. NaN and ∞ are not free.
+    /// Whether everything that moves with the arm keeps its margins at the joint vector `q`. \[rad\]
+    /// or \[m\] NaN and ∞ are not free.
     #[must_use]
     pub fn is_free(&self, q: &JointVector, contact: ToolContact) -> bool {
         self.is_in_range(q) && self.are_clear(&self.bodies.poses(q), contact, &Slack::NONE)
     }
 
-    /// The first pair too near, for messages; from the exact check, so it is slow.
+    /// The first pair too near at the joint vector `q` \[rad\] or \[m\], for messages; from the exact
+    /// check, so it is slow.
     #[must_use]
     pub fn why_not(&self, q: &JointVector, contact: ToolContact) -> Option<Hit> {
         self.exact().first_hit(q, contact)
@@ -99,7 +107,7 @@ impl World {
     }
 
     /// Whether one check holds with the slack added, the bodies standing at `poses`.
-    pub(super) fn holds(
+    pub(crate) fn holds(
         &self,
         check: Check,
         poses: &[Frame; MAX_BODIES],
@@ -127,7 +135,7 @@ impl World {
     }
 
     /// The bodies that the checks are about, one bit each.
-    pub(super) fn bodies_of(&self, checks: &[Check]) -> u32 {
+    pub(crate) fn bodies_of(&self, checks: &[Check]) -> u32 {
         let bit = |shape: usize| 1u32 << self.moving[shape].body;
         checks.iter().fold(0, |bits, check| match *check {
             Check::Scan(shape) | Check::Fixed(shape) => bits | bit(shape),
@@ -241,16 +249,6 @@ fn fixed_bit(index: usize) -> u128 {
     1 << index.min(127)
 }
 
-impl Fixed {
-    /// Squared distance from a point of the root frame to the axis-aligned bounds. \[m²\]
-    #[inline]
-    pub(crate) fn box_distance_squared(&self, p: &Vector3<f64>) -> f64 {
-        let outside = |i: usize| (self.min[i] - p[i]).max(p[i] - self.max[i]).max(0.0);
-        let (x, y, z) = (outside(0), outside(1), outside(2));
-        x * x + y * y + z * z
-    }
-}
-
 /// Whether `shape`, its body at `relative` in some frame, is at least `need` from the solid that
 /// stands at `place` in that frame.
 fn is_pair_clear(
@@ -274,13 +272,6 @@ fn is_pair_clear(
         },
         |_| false,
     ) || gjk_distance(&pose, other, &shape.shape) >= need
-}
-
-/// Distance between two shapes, the second at `pose` in the first's frame; 0 if they overlap. \[m\]
-pub(crate) fn gjk_distance(pose: &Frame, first: &SharedShape, second: &SharedShape) -> f64 {
-    DefaultQueryDispatcher
-        .distance(&pose.to_parry(), &**first, &**second)
-        .map_or(0.0, |found| found.distance)
 }
 
 /// The signed distance, but only a lower bound of it where that already is `enough`. \[m\]

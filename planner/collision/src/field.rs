@@ -1,7 +1,7 @@
 //! The scan as an obstacle: a two-level grid of distances in front of the raw points.
 //!
 //! Both levels hold a lower bound of the distance of the grid's nodes to the nearest raw point, so
-//! the bound at any place is the node's less the way to the node: never more than the true
+//! the bound at any place is the node's less the distance to the node: never more than the true
 //! distance. What the grid cannot prove is decided on the raw points, kept in cells.
 
 use nalgebra::{Point3, Vector3};
@@ -119,50 +119,10 @@ impl Field {
             || (need < self.fine_cap && self.fine.bound(p) >= need)
     }
 
-    /// A lower bound of the distance from `p` to the nearest point \[m\], 0 if unknown.
-    #[inline]
-    pub(crate) fn bound(&self, p: &Vector3<f64>) -> f64 {
-        if self.points.is_empty() {
-            return f64::INFINITY;
-        }
-        let outside = self.box_distance_squared(p).sqrt();
-        outside.max(self.coarse.bound(p)).max(self.fine.bound(p))
-    }
-
     /// Squared distance to the bounds of the points. \[m²\]
     #[inline]
     fn box_distance_squared(&self, p: &Vector3<f64>) -> f64 {
         (self.min - p).sup(&(p - self.max)).map(|x| x.max(0.0)).norm_squared()
-    }
-
-    /// Calls `test` on every point in the box, until it is false; whether it never was.
-    #[inline]
-    pub(crate) fn all_in_box(
-        &self,
-        min: &Vector3<f64>,
-        max: &Vector3<f64>,
-        mut test: impl FnMut(&Vector3<f64>) -> bool,
-    ) -> bool {
-        if self.points.is_empty() {
-            return true;
-        }
-        let grid = &self.cells;
-        let (low, high) = (grid.clamped_cell(min), grid.clamped_cell(max));
-        for z in low[2]..=high[2] {
-            for y in low[1]..=high[1] {
-                let row = (z * grid.size[1] + y) * grid.size[0];
-                // Cells of one row follow each other, so their points are one slice.
-                let from = self.starts[row + low[0]] as usize;
-                let to = self.starts[row + high[0] + 1] as usize;
-                for p in &self.points[from..to] {
-                    let inside = (0..3).all(|i| p[i] >= min[i] && p[i] <= max[i]);
-                    if inside && !test(p) {
-                        return false;
-                    }
-                }
-            }
-        }
-        true
     }
 
     /// Calls `test` on every point that may be nearer than `need` to the solid standing at `at`, and
@@ -210,20 +170,6 @@ impl Field {
         }
         true
     }
-
-    /// Calls `test` on every point within `radius` of `p`, until it is false; whether it never was.
-    #[inline]
-    pub(crate) fn all_within(
-        &self,
-        p: &Vector3<f64>,
-        radius: f64,
-        mut test: impl FnMut(&Vector3<f64>) -> bool,
-    ) -> bool {
-        let (reach, squared) = (Vector3::repeat(radius), radius * radius);
-        self.all_in_box(&(p - reach), &(p + reach), |point| {
-            (point - p).norm_squared() > squared || test(point)
-        })
-    }
 }
 
 impl Grid {
@@ -241,8 +187,8 @@ impl Grid {
         }
     }
 
-    /// The grid for the far field: exact distances between nodes, less the way from a point to its
-    /// node.
+    /// The grid for the far field: exact distances between nodes, less the distance from a point
+    /// to its node.
     fn coarse(min: Vector3<f64>, max: Vector3<f64>, fine: f64, points: &[Vector3<f64>]) -> Self {
         let extent = (max - min).map(|x| x + 2.0 * COARSE_BORDER);
         let mut spacing = COARSE_STEP * fine;
@@ -377,28 +323,26 @@ mod tests {
             .collect();
         let field = Field::new(&scan, &Vector3::zeros(), 10.0);
         assert_eq!(field.len(), scan.len());
-        let mut loosest = 0.0f64;
-        for _ in 0..20_000 {
-            let p = Vector3::new(
+        let mut near = 0;
+        for n in 0..20_000 {
+            let mut p = Vector3::new(
                 rng.random_range(-0.5..2.0),
                 rng.random_range(-1.2..1.2),
                 rng.random_range(-0.2..2.0),
             );
-            let truth = scan.iter().map(|q| (q.coords - p).norm()).fold(f64::MAX, f64::min);
-            let bound = field.bound(&p);
-            assert!(bound <= truth, "bound {bound} > distance {truth} at {p}");
-            assert!(!field.is_farther(&p, truth + 1e-6));
-            if truth < 0.02 {
-                loosest = loosest.max(truth - bound);
+            if n % 4 == 0 {
+                let on = scan[rng.random_range(0..scan.len())].coords;
+                p = on + 0.015 * (p - Vector3::new(0.75, 0.0, 0.9));
             }
-            let mut within = 0;
-            field.all_within(&p, 0.1, |_| {
-                within += 1;
-                true
-            });
-            assert_eq!(within, scan.iter().filter(|q| (q.coords - p).norm() <= 0.1).count());
+            let truth = scan.iter().map(|q| (q.coords - p).norm()).fold(f64::MAX, f64::min);
+            assert!(!field.is_farther(&p, truth + 1e-9), "more than the true {truth} m at {p}");
+            // Near the surface what is proven is two fine spacings short of the truth at most.
+            if truth < 0.02 {
+                near += 1;
+                assert!(field.is_farther(&p, truth - 2.0 * 0.01), "{truth} m at {p}");
+            }
         }
-        assert!(loosest < 2.0 * 0.01, "near the surface the bound is {loosest} m too low");
+        assert!(near > 1000, "{near} places near the surface");
     }
 
     #[test]

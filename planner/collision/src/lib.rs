@@ -1,9 +1,10 @@
 //! Collision: whether a configuration, or a motion, keeps its distance from robot and environment.
 //!
-//! Everything is in the robot's root frame. A [`World`] is built once per stance and then asked
-//! from any number of threads. Its fast check proves freedom by bounds (spheres over each shape, a
-//! distance grid over the scan) and falls back to exact distances where bounds do not suffice;
-//! [`World::exact`] is the slow check by parry's shapes and every raw point, for verification.
+//! Everything is in the robot's root frame, lengths in metres, angles in radians. There are two
+//! checks, each built once per stance and then asked from any number of threads:
+//! - [`World`], the fast one, for the search: it proves freedom by bounds (spheres over each shape,
+//!   a distance grid over the scan) and falls back to distances by GJK where bounds do not suffice.
+//! - [`Exact`], the slow one, for the verification: parry's shapes, every pair and every raw point.
 //!
 //! # What is checked
 //! - Each shape that moves with the arm (the links' own shapes, attached objects, the tool's pad)
@@ -34,16 +35,23 @@
 
 mod bodies;
 mod check;
-mod clearance;
+mod error;
 mod exact;
 mod field;
+mod fixed;
 mod frame;
 mod mesh;
 mod motion;
+mod moving;
 mod never;
+mod obstacle;
+mod options;
 mod pairs;
 mod parts;
 mod proof;
+mod rules;
+mod scene;
+mod shapes;
 mod sieve;
 mod solid;
 mod spheres;
@@ -52,209 +60,12 @@ mod srdf;
 mod tests;
 mod world;
 
+pub use error::CollisionError;
 pub use exact::Exact;
 pub use mesh::{MeshError, MeshPaths};
+pub use obstacle::{Obstacle, ObstacleShape};
+pub use options::{Attached, Options};
 pub use pairs::{Excluded, Reason};
+pub use rules::{Hit, Margins, ToolContact, With};
 pub use srdf::{GroupState, SrdfError, group_states};
 pub use world::World;
-
-use nalgebra::{Isometry3, Point3, Vector3};
-use nullsweep_robot::CollisionShape;
-use std::path::PathBuf;
-
-/// Distances to keep. \[m\]
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Margins {
-    /// Between shapes of the robot.
-    pub self_clearance: f64,
-    /// Between the robot and the environment (scan points and obstacles).
-    pub environment: f64,
-    /// How far the contact prism reaches beyond the pad's sides; also the pad's own margin to
-    /// scan points outside the prism while contact is allowed.
-    pub contact_growth: f64,
-    /// How far the contact prism reaches before the pad's plane.
-    pub contact_front: f64,
-    /// What shapes that are rigid to the tip keep from scan points outside the prism while contact
-    /// is allowed.
-    pub contact_clearance: f64,
-    /// How deep a point of the contact prism may lie inside a shape that is rigid to the tip.
-    pub contact_depth: f64,
-}
-
-impl Default for Margins {
-    fn default() -> Self {
-        Self {
-            self_clearance: 0.005,
-            environment: 0.005,
-            contact_growth: 0.005,
-            contact_front: 0.015,
-            contact_clearance: 0.001,
-            contact_depth: 0.005,
-        }
-    }
-}
-
-/// Whether the tool's pad may touch the scan: see the contact rule of this module.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ToolContact {
-    /// The pad works on the surface.
-    Allowed,
-    /// The tool too keeps its margin: transfers.
-    Forbidden,
-}
-
-/// Something to keep away from besides the scan, in the root frame.
-#[derive(Clone, Debug)]
-pub struct Obstacle {
-    /// For people.
-    pub name: String,
-    /// Its shape about its own origin.
-    pub shape: ObstacleShape,
-    /// Where it is.
-    pub pose: Isometry3<f64>,
-    /// The robot stands on it: only what moves with the arm is checked against it.
-    pub carries_robot: bool,
-}
-
-/// The shape of an obstacle. \[m\]
-#[derive(Clone, Debug)]
-pub enum ObstacleShape {
-    /// A cuboid about the origin.
-    Box {
-        /// Half of its size along x, y, z.
-        half_extents: Vector3<f64>,
-    },
-    /// The convex hull of an STL file; a concave thing takes one file for each convex piece.
-    Mesh {
-        /// The file, in metres.
-        path: PathBuf,
-    },
-    /// All that is below the plane z = 0: a floor.
-    Floor,
-}
-
-impl Obstacle {
-    /// The floor z = 0 of a floor frame that stands at `pose` in the root frame.
-    #[must_use]
-    pub fn floor(pose: Isometry3<f64>) -> Self {
-        Self { name: "floor".into(), shape: ObstacleShape::Floor, pose, carries_robot: true }
-    }
-}
-
-/// A held object that moves with a link.
-#[derive(Clone, Debug)]
-pub struct Attached {
-    /// For people.
-    pub name: String,
-    /// The link that it is fixed to.
-    pub link: String,
-    /// Its shape, in the link's frame.
-    pub shape: CollisionShape,
-}
-
-/// How a [`World`] is built.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// Distances to keep.
-    pub margins: Margins,
-    /// Where collision meshes are found.
-    pub meshes: MeshPaths,
-    /// Radius \[m\] of capsules put along links whose mesh is missing, and along moving links with
-    /// no collision shape at all; none: a missing mesh is an error.
-    pub fit_capsules: Option<f64>,
-    /// Pairs to leave out, instead of those found by sampling.
-    pub srdf: Option<PathBuf>,
-    /// Held objects.
-    pub attached: Vec<Attached>,
-}
-
-/// Why a [`World`] could not be built.
-#[derive(Debug, thiserror::Error)]
-pub enum CollisionError {
-    /// A link's (or attached object's) mesh cannot be used.
-    #[error("collision mesh of {link}: {error}")]
-    Mesh {
-        /// The link or object.
-        link: String,
-        /// What is wrong with its mesh.
-        error: MeshError,
-    },
-    /// An obstacle's mesh cannot be used.
-    #[error("mesh of obstacle {obstacle}: {error}")]
-    ObstacleMesh {
-        /// The obstacle.
-        obstacle: String,
-        /// What is wrong with its mesh.
-        error: MeshError,
-    },
-    /// A link that the robot does not have.
-    #[error("{named_by} names link {link}, which the robot does not have")]
-    UnknownLink {
-        /// The link.
-        link: String,
-        /// Who names it.
-        named_by: String,
-    },
-    /// The SRDF cannot be used.
-    #[error(transparent)]
-    Srdf(#[from] SrdfError),
-    /// A scan point is NaN or infinite.
-    #[error("scan point {index} is not finite: clean the scan first")]
-    NotFinite {
-        /// Index into the scan.
-        index: usize,
-    },
-    /// A margin is negative or not a number.
-    #[error("margin {name} is {value} m: it must be a number of at least 0")]
-    Margin {
-        /// Which one.
-        name: &'static str,
-        /// Its value. \[m\]
-        value: f64,
-    },
-    /// More driven joints than the check can hold.
-    #[error("{count} joints are driven by the arm (with mimics), at most {most} are supported")]
-    TooManyBodies {
-        /// Joints driven.
-        count: usize,
-        /// The most.
-        most: usize,
-    },
-}
-
-/// Two things closer than their margin.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Hit {
-    /// The link (or tool, or attached object).
-    pub link: String,
-    /// What it is too near to.
-    pub with: With,
-    /// Their distance, negative for a point inside a shape. \[m\]
-    pub distance: f64,
-    /// The distance they should keep. \[m\]
-    pub margin: f64,
-}
-
-/// The other side of a [`Hit`].
-#[derive(Clone, Debug, PartialEq)]
-pub enum With {
-    /// Another link (or the tool, or an attached object).
-    Link(String),
-    /// A scan point, in the root frame.
-    ScanPoint(Point3<f64>),
-    /// An obstacle.
-    Obstacle(String),
-}
-
-impl std::fmt::Display for Hit {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (distance, margin) = (1e3 * self.distance, 1e3 * self.margin);
-        write!(f, "{} is {distance:.1} mm from ", self.link)?;
-        match &self.with {
-            With::Link(name) => write!(f, "{name}")?,
-            With::Obstacle(name) => write!(f, "obstacle {name}")?,
-            With::ScanPoint(p) => write!(f, "scan point ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)?,
-        }
-        write!(f, ", must keep {margin:.1} mm")
-    }
-}

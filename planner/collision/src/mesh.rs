@@ -63,7 +63,7 @@ pub enum MeshError {
 
 impl MeshPaths {
     /// The file that a mesh URI leads to.
-    pub fn resolve(&self, uri: &str) -> Result<PathBuf, MeshError> {
+    pub(crate) fn resolve(&self, uri: &str) -> Result<PathBuf, MeshError> {
         if let Some(rest) = uri.strip_prefix("package://") {
             let (package, path) = rest.split_once('/').unwrap_or((rest, ""));
             let folder = self

@@ -7,14 +7,14 @@ use nullsweep_robot::{Arm, JointVector};
 
 use crate::bodies::{Bodies, MAX_BODIES};
 use crate::frame::Frame;
-use crate::world::{Moving, World};
+use crate::moving::Moving;
 
 /// How much farther than its margin each body has to be. \[m\]
 #[derive(Clone, Debug)]
 pub(crate) struct Slack<'a> {
     /// Relative to the root frame.
     pub(crate) body: [f64; MAX_BODIES],
-    /// Relative to another body: what these ways of the joints give, if that is less.
+    /// Relative to another body: what this travel of the joints gives, if that is less.
     joints: Option<(&'a Reach, JointVector)>,
 }
 
@@ -28,8 +28,8 @@ pub(crate) struct Reach {
     /// A ball in the root frame that no moving part ever leaves. \[m\]
     pub(crate) centre: Vector3<f64>,
     pub(crate) radius: f64,
-    /// Largest |value| of each joint for which that holds.
-    pub(crate) travel: Vec<f64>,
+    /// Largest |value| of each sliding joint for which that holds \[m\]; infinite for turning ones.
+    pub(crate) stroke: Vec<f64>,
 }
 
 /// What the joint of `body` does to the points of a body that hangs on it.
@@ -38,8 +38,8 @@ struct Lever {
     body: usize,
     /// Index into the joint vector.
     joint: usize,
-    /// Times the joint's change gives the largest way of a point. \[m/rad\] or \[m/m\]
-    way: f64,
+    /// Times the joint's change gives the largest displacement of a point. \[m/rad\] or \[m/m\]
+    length: f64,
     /// Times the joint's change gives the body's own turn or slide.
     rate: f64,
 }
@@ -47,22 +47,22 @@ struct Lever {
 impl<'a> Slack<'a> {
     pub(crate) const NONE: Self = Self { body: [0.0; MAX_BODIES], joints: None };
 
-    /// For a motion that takes each joint this way at most. \[rad\] or \[m\]
-    pub(crate) fn new(reach: &'a Reach, way: JointVector) -> Self {
-        Self { body: [0.0; MAX_BODIES], joints: Some((reach, way)) }
+    /// For a motion in which each joint travels so far at most. \[rad\] or \[m\]
+    pub(crate) fn new(reach: &'a Reach, travel: JointVector) -> Self {
+        Self { body: [0.0; MAX_BODIES], joints: Some((reach, travel)) }
     }
 
     /// Bound of the motion of two bodies relative to each other. \[m\]
     #[inline]
     pub(crate) fn between(&self, a: usize, b: usize) -> f64 {
         let both = self.body[a] + self.body[b];
-        self.joints.as_ref().map_or(both, |(reach, way)| both.min(reach.between(a, b, way)))
+        self.joints.as_ref().map_or(both, |(reach, travel)| both.min(reach.between(a, b, travel)))
     }
 }
 
 impl Reach {
     pub(crate) fn new(bodies: &Bodies, arm: &Arm, moving: &[Moving]) -> Self {
-        let travel: Vec<f64> = arm
+        let stroke: Vec<f64> = arm
             .limits()
             .iter()
             .enumerate()
@@ -76,7 +76,7 @@ impl Reach {
         // How far a prismatic body slides from its rest place at most.
         let slide = |body: usize| {
             let b = &bodies.bodies[body];
-            if b.prismatic { b.most_slide(travel[b.joint]) } else { 0.0 }
+            if b.prismatic { b.most_slide(stroke[b.joint]) } else { 0.0 }
         };
         let count = bodies.bodies.len();
         let parts = |body: usize| moving.iter().filter(move |m| m.body == body);
@@ -91,7 +91,7 @@ impl Reach {
             let (mut at, mut below, mut rest) = (body, None::<usize>, own_reach[body]);
             loop {
                 let b = &bodies.bodies[at];
-                let way = match below {
+                let length = match below {
                     _ if b.prismatic => 1.0,
                     None => parts(body).map(|m| m.reach_from_axis(&b.axis)).fold(0.0, f64::max),
                     Some(child) => {
@@ -101,7 +101,7 @@ impl Reach {
                     }
                 };
                 let rate = b.multiplier.abs();
-                levers.push(Lever { body: at, joint: b.joint, way: way * rate, rate });
+                levers.push(Lever { body: at, joint: b.joint, length: length * rate, rate });
                 let Some(parent) = b.parent else { break };
                 rest += b.rest.translation.norm() + slide(at);
                 below = Some(at);
@@ -127,19 +127,19 @@ impl Reach {
                 (centre, parts(b).map(|m| m.reach_from(&centre)).fold(0.0, f64::max))
             })
             .collect();
-        Self { lever, ball, centre, radius, travel }
+        Self { lever, ball, centre, radius, stroke }
     }
 
-    /// How far a point of a body moves at most, in the root frame, while each joint goes no farther
-    /// than `way`. \[m\]
+    /// How far a point of a body moves at most, in the root frame, while no joint travels farther
+    /// than `travel`. \[m\]
     #[inline]
-    pub(crate) fn way(&self, body: usize, way: &JointVector) -> f64 {
-        self.lever[body].iter().map(|l| l.way * way[l.joint]).sum()
+    pub(crate) fn displacement(&self, body: usize, travel: &JointVector) -> f64 {
+        self.lever[body].iter().map(|l| l.length * travel[l.joint]).sum()
     }
 
     /// The same in the frame of another body: the joints before both do not count. Infinite if
     /// neither hangs on the other.
-    fn between(&self, a: usize, b: usize, way: &JointVector) -> f64 {
+    fn between(&self, a: usize, b: usize, travel: &JointVector) -> f64 {
         // Parents come first.
         let (low, high) = (a.max(b), a.min(b));
         let mut sum = 0.0;
@@ -147,19 +147,19 @@ impl Reach {
             if l.body == high {
                 return sum;
             }
-            sum += l.way * way[l.joint];
+            sum += l.length * travel[l.joint];
         }
         f64::INFINITY
     }
 
     /// How far a point of a body can be from the straight line between its places at both ends of a
-    /// straight joint line that takes each joint the way `way`. \[m\]
-    pub(crate) fn bend(&self, body: usize, way: &JointVector) -> f64 {
+    /// straight joint line on which each joint travels `travel`. \[m\]
+    pub(crate) fn bend(&self, body: usize, travel: &JointVector) -> f64 {
         // A point x moves with ẍ = Σₖⱼ q̇ₖ q̇ⱼ hₖⱼ, where |hₖⱼ| is the distance of x from the axis
-        // of the later of both joints at most; in unit time that bends its way by an eighth.
+        // of the later of both joints at most; in unit time that takes it an eighth of that off its chord.
         let levers = &self.lever[body];
         let pull = |k: &Lever, j: &Lever| {
-            way[k.joint] * way[j.joint] * (k.way * j.rate).max(j.way * k.rate)
+            travel[k.joint] * travel[j.joint] * (k.length * j.rate).max(j.length * k.rate)
         };
         levers.iter().map(|k| levers.iter().map(|j| pull(k, j)).sum::<f64>()).sum::<f64>() / 8.0
     }
@@ -177,16 +177,5 @@ impl Reach {
         // change of the rotation matrix is 2 √2 sin(θ/2).
         let turn = (to.rotation - from.rotation).norm() * FRAC_1_SQRT_2;
         (to_centre - from_centre).norm() + turn * self.ball[body].1
-    }
-}
-
-impl World {
-    /// An upper bound of the path length of the fastest point of arm and tool along the straight
-    /// joint line from `a` to `b`. \[m\]
-    #[must_use]
-    pub fn motion_bound(&self, a: &JointVector, b: &JointVector) -> f64 {
-        let way: JointVector = JointVector::from_fn(|j| (b[j] - a[j]).abs());
-        let bodies = 0..self.bodies.bodies.len();
-        bodies.map(|body| self.reach.way(body, &way)).fold(0.0, f64::max)
     }
 }

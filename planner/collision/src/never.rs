@@ -13,9 +13,9 @@ use nullsweep_robot::{Arm, MAX_DOF};
 use parry3d_f64::shape::SharedShape;
 
 use crate::bodies::Bodies;
-use crate::check::{TOLERANCE, gjk_distance};
 use crate::frame::Frame;
-use crate::solid::Solid;
+use crate::rules::TOLERANCE;
+use crate::solid::{Solid, gjk_distance};
 
 /// Range of each joint within which the proofs hold. \[rad\] or \[m\]
 pub(crate) type Ranges = [(f64, f64); MAX_DOF];
@@ -34,13 +34,13 @@ pub(crate) struct Placed<'a> {
 }
 
 /// Where joints may be: all turns for continuous ones, a little beyond the limits for others;
-/// sliding ones keep `travel`.
-pub(crate) fn ranges(arm: &Arm, travel: &[f64]) -> Ranges {
+/// sliding ones keep their `stroke`.
+pub(crate) fn ranges(arm: &Arm, stroke: &[f64]) -> Ranges {
     std::array::from_fn(|j| match arm.limits().get(j) {
-        Some(limits) if travel[j].is_infinite() && !limits.continuous => {
+        Some(limits) if stroke[j].is_infinite() && !limits.continuous => {
             (limits.lower - BEYOND, limits.upper + BEYOND)
         }
-        Some(_) => (-travel[j], travel[j]),
+        Some(_) => (-stroke[j], stroke[j]),
         None => (f64::NEG_INFINITY, f64::INFINITY),
     })
 }

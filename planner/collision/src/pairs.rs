@@ -8,9 +8,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::bodies::Bodies;
-use crate::exact::Shapes;
+use crate::error::CollisionError;
+use crate::options::Options;
 use crate::parts::Part;
-use crate::{CollisionError, Options, srdf};
+use crate::shapes::{distance, poses};
+use crate::srdf;
 
 /// Two links (or tool, or attached object) that are not checked against each other.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,21 +65,17 @@ pub(crate) fn find(
     arm: &Arm,
     bodies: &Bodies,
     parts: &[Part],
-    shapes: &Shapes,
     options: &Options,
 ) -> Result<Pairs, CollisionError> {
     let disabled: Option<BTreeSet<(String, String)>> = match &options.srdf {
         Some(path) => Some(srdf::disabled_pairs(path)?.into_iter().map(ordered).collect()),
         None => None,
     };
-    let body_of = |part: &Part| match part.link {
-        Some(link) => bodies.links[link].0,
-        None => Some(bodies.tip_body),
-    };
+    let body_of = |part: &Part| bodies.carrier(part.link).0;
 
     let mut pairs = Pairs::default();
     let near = options.margins.self_clearance + NEIGHBOURS;
-    let samples = sample(arm);
+    let (samples, links) = (sample(arm), robot.links().len());
     let mut placed: Vec<Option<Vec<Pose>>> = vec![None; samples.len()];
     for (j, second) in parts.iter().enumerate() {
         for (i, first) in parts.iter().enumerate().take(j) {
@@ -92,8 +90,8 @@ pub(crate) fn find(
                 (0..parts.len()).filter(move |&k| parts[k].name == name)
             };
             let mut touch = |s: usize, a: usize, b: usize| {
-                let poses = placed[s].get_or_insert_with(|| shapes.poses(arm, &samples[s]));
-                shapes.distance(poses, a, b) < near
+                let at = placed[s].get_or_insert_with(|| poses(parts, links, arm, &samples[s]));
+                distance(&at[a], &*parts[a].shape, &at[b], &*parts[b].shape) < near
             };
             let reason = if adjacent(robot, first, second) {
                 Some(Reason::Adjacent)

@@ -1,68 +1,39 @@
 //! The collision shapes of a robot: from its URDF, mesh files, fitted capsules and the tool.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use nullsweep_robot::{Arm, Geometry, Robot, Tool};
+use std::f64::consts::PI;
 
-use crate::mesh::{MeshError, MeshPaths, read_stl};
-use crate::solid::{Hull, Solid};
-use crate::{Attached, CollisionError, Options};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nullsweep_robot::{Arm, Robot, Tool};
+use parry3d_f64::shape::SharedShape;
+
+use crate::error::CollisionError;
+use crate::options::{Attached, Options};
+use crate::solid::Solid;
 
 /// One convex shape fixed to a link.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct Part {
     /// Index of the link that carries it; none: the arm's tip frame.
     pub(crate) link: Option<usize>,
     /// The name that it is known by: its link's, or that of the tool or an attached object.
     pub(crate) name: String,
-    /// Pose in the link's (or the tip's) frame.
+    pub(crate) solid: Solid,
+    /// The same for parry.
+    pub(crate) shape: SharedShape,
+    /// The solid's pose in the link's (or the tip's) frame. \[m\]
     pub(crate) origin: Isometry3<f64>,
-    pub(crate) shape: PartShape,
     /// The tool's pad, which may touch the scan.
     pub(crate) is_pad: bool,
-}
-
-/// The shape of a part about its origin; axes along z. \[m\]
-#[derive(Clone, Debug)]
-pub(crate) enum PartShape {
-    Box {
-        half: Vector3<f64>,
-    },
-    Cylinder {
-        radius: f64,
-        half: f64,
-    },
-    Sphere {
-        radius: f64,
-    },
-    Capsule {
-        radius: f64,
-        half: f64,
-    },
-    /// The convex hull of these points.
-    Hull(Vec<Point3<f64>>),
 }
 
 /// Shortest distance between two joints that gets a capsule instead of a ball. \[m\]
 const SHORT: f64 = 1e-3;
 
 impl Part {
-    /// The solid and its pose in the link's frame.
-    pub(crate) fn solid(&self) -> Option<(Solid, Isometry3<f64>)> {
-        let solid = match &self.shape {
-            PartShape::Box { half } => Solid::Box { half: *half },
-            PartShape::Sphere { radius } => Solid::Ball { radius: *radius },
-            PartShape::Capsule { radius, half } => Solid::Capsule { half: *half, radius: *radius },
-            PartShape::Cylinder { radius, half } => {
-                let quarter = UnitQuaternion::from_axis_angle(
-                    &Vector3::x_axis(),
-                    std::f64::consts::FRAC_PI_2,
-                );
-                let solid = Solid::Cylinder { half: *half, radius: *radius };
-                return Some((solid, self.origin * quarter));
-            }
-            PartShape::Hull(points) => Solid::Hull(Box::new(Hull::new(points)?)),
-        };
-        Some((solid, self.origin))
+    /// Of a link, or of the tip frame; not the pad.
+    fn new(link: Option<usize>, name: &str, solid: Solid, origin: Isometry3<f64>) -> Self {
+        let shape = solid.to_parry();
+        Self { link, name: name.to_owned(), solid, shape, origin, is_pad: false }
     }
 }
 
@@ -79,14 +50,10 @@ pub(crate) fn collect(
         let mut missing = None;
         let mut found = Vec::new();
         for shape in &link.collisions {
-            match resolve(&shape.geometry, &options.meshes) {
-                Ok(geometry) => found.push(Part {
-                    link: Some(index),
-                    name: link.name.clone(),
-                    origin: shape.origin,
-                    shape: geometry,
-                    is_pad: false,
-                }),
+            match Solid::prepare(&shape.geometry, shape.origin, &options.meshes) {
+                Ok((solid, origin)) => {
+                    found.push(Part::new(Some(index), &link.name, solid, origin));
+                }
                 Err(error) => missing = Some(error),
             }
         }
@@ -122,59 +89,21 @@ pub(crate) fn collect(
         let index = robot.links().iter().position(|l| l.name == *link).ok_or_else(|| {
             CollisionError::UnknownLink { link: link.clone(), named_by: format!("object {name}") }
         })?;
-        let geometry = resolve(&shape.geometry, &options.meshes)
+        let (solid, origin) = Solid::prepare(&shape.geometry, shape.origin, &options.meshes)
             .map_err(|error| CollisionError::Mesh { link: name.clone(), error })?;
-        parts.push(Part {
-            link: Some(index),
-            name: name.clone(),
-            origin: shape.origin,
-            shape: geometry,
-            is_pad: false,
-        });
+        parts.push(Part::new(Some(index), name, solid, origin));
     }
     let half = 0.5 * Vector3::new(tool.width, tool.length, tool.thickness);
-    parts.push(Part {
-        link: None,
-        name: tool.name.clone(),
-        origin: tool.contact_in_tip() * Isometry3::translation(0.0, 0.0, -half.z),
-        shape: PartShape::Box { half },
-        is_pad: true,
-    });
+    let centre = tool.contact_in_tip() * Isometry3::translation(0.0, 0.0, -half.z);
+    let pad = Part::new(None, &tool.name, Solid::Box { half }, centre);
+    parts.push(Part { is_pad: true, ..pad });
     Ok((parts, notes))
-}
-
-/// A URDF geometry with its mesh, if it is one, read from its file.
-pub(crate) fn resolve(geometry: &Geometry, meshes: &MeshPaths) -> Result<PartShape, MeshError> {
-    Ok(match geometry {
-        Geometry::Box { half_extents } => PartShape::Box { half: *half_extents },
-        Geometry::Cylinder { radius, half_length } => {
-            PartShape::Cylinder { radius: *radius, half: *half_length }
-        }
-        Geometry::Sphere { radius } => PartShape::Sphere { radius: *radius },
-        Geometry::Capsule { radius, half_length } => {
-            PartShape::Capsule { radius: *radius, half: *half_length }
-        }
-        Geometry::Mesh { uri, scale } => {
-            let path = meshes.resolve(uri)?;
-            let points = read_stl(&path, scale)?;
-            if Hull::new(&points).is_none() {
-                return Err(MeshError::Flat { path, vertices: points.len() });
-            }
-            PartShape::Hull(points)
-        }
-    })
 }
 
 /// Capsules from a link's origin to the joints of its children; a ball at the origin where
 /// `always` and there is no child at a distance.
 fn fit(robot: &Robot, link: usize, radius: f64, always: bool) -> Vec<Part> {
-    let part = |origin, shape| Part {
-        link: Some(link),
-        name: robot.links()[link].name.clone(),
-        origin,
-        shape,
-        is_pad: false,
-    };
+    let part = |origin, solid| Part::new(Some(link), &robot.links()[link].name, solid, origin);
     let mut parts: Vec<Part> = robot
         .joints()
         .iter()
@@ -182,15 +111,14 @@ fn fit(robot: &Robot, link: usize, radius: f64, always: bool) -> Vec<Part> {
         .map(|joint| joint.origin.translation.vector)
         .filter(|to| to.norm() > SHORT)
         .map(|to| {
-            let turn = UnitQuaternion::rotation_between(&Vector3::z(), &to).unwrap_or_else(|| {
-                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
-            });
+            let turn = UnitQuaternion::rotation_between(&Vector3::z(), &to)
+                .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
             let origin = Isometry3::from_parts((0.5 * to).into(), turn);
-            part(origin, PartShape::Capsule { radius, half: 0.5 * to.norm() })
+            part(origin, Solid::Capsule { half: 0.5 * to.norm(), radius })
         })
         .collect();
     if parts.is_empty() && always {
-        parts.push(part(Isometry3::identity(), PartShape::Sphere { radius }));
+        parts.push(part(Isometry3::identity(), Solid::Ball { radius }));
     }
     parts
 }

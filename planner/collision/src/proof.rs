@@ -10,26 +10,16 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 use nullsweep_robot::JointVector;
 
-use crate::ToolContact;
 use crate::bodies::MAX_BODIES;
+use crate::check::Check;
 use crate::frame::Frame;
 use crate::motion::Slack;
+use crate::rules::ToolContact;
 use crate::world::World;
 
 /// The straight line between two joint vectors is halved at most this often before it counts as
 /// not proven.
 const HALVINGS: u32 = 7;
-
-/// One thing to check, by its index in the world.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Check {
-    /// A moving shape against the scan.
-    Scan(usize),
-    /// A moving shape against the fixed shapes.
-    Fixed(usize),
-    /// A pair of moving shapes.
-    Pair(usize),
-}
 
 /// A part of a path.
 #[derive(Clone, Copy, Debug)]
@@ -70,30 +60,25 @@ struct Proof<'a> {
     path: &'a [JointVector],
     contact: ToolContact,
     postures: Vec<Posture>,
-    /// Way of each joint from the path's start up to each joint vector. \[rad\] or \[m\]
-    ways: Vec<JointVector>,
-    /// How far each line bends, see [`super::motion::Reach::bend`]. \[m\]
+    /// Length that each joint travels from the path's start up to each joint vector. \[rad\] or \[m\]
+    travelled: Vec<JointVector>,
+    /// How far each line bends, see [`Reach::bend`](crate::motion::Reach::bend). \[m\]
     bends: Vec<[f64; MAX_BODIES]>,
 }
 
 impl World {
-    /// Whether the whole straight joint line from `a` to `b` is proven free. False if a collision
-    /// is found, or if no proof is found within 7 halvings (a motion that grazes a margin).
+    /// Whether the whole straight joint line from `a` to `b` \[rad\] or \[m\] is proven free. False if
+    /// a collision is found, or if no proof is found within 7 halvings (a motion that grazes a
+    /// margin).
     #[must_use]
     pub fn motion_free(&self, a: &JointVector, b: &JointVector, contact: ToolContact) -> bool {
         // The end first: it is where a useless motion is most often seen to be one.
-        self.is_free(b, contact) && self.path_free(&[*a, *b], contact)
+        self.is_free(b, contact) && self.unproven(&[*a, *b], contact).is_none()
     }
 
-    /// Whether the whole path, straight joint lines from one joint vector to the next, is proven
+    /// Where along the path, straight joint lines from one joint vector to the next \[rad\] or \[m\],
+    /// no proof was found: at this joint vector, or between it and the next. None: the whole path is
     /// free; see [`Self::motion_free`].
-    #[must_use]
-    pub fn path_free(&self, path: &[JointVector], contact: ToolContact) -> bool {
-        self.unproven(path, contact).is_none()
-    }
-
-    /// Where along the path no proof was found: at this joint vector, or between it and the next.
-    /// None: the whole path is free, see [`Self::path_free`].
     #[must_use]
     pub fn unproven(&self, path: &[JointVector], contact: ToolContact) -> Option<usize> {
         let outside = path.iter().position(|q| !self.is_in_range(q));
@@ -103,20 +88,20 @@ impl World {
 
 impl<'a> Proof<'a> {
     fn new(world: &'a World, path: &'a [JointVector], contact: ToolContact) -> Self {
-        let mut ways = vec![JointVector::ZERO];
+        let mut travelled = vec![JointVector::ZERO];
         let mut bends = Vec::with_capacity(path.len());
         for pair in path.windows(2) {
-            let way = pair[0].displacement(&pair[1]);
-            let before = ways[ways.len() - 1];
-            ways.push(before + way);
+            let travel = pair[0].displacement(&pair[1]);
+            let before = travelled[travelled.len() - 1];
+            travelled.push(before + travel);
             let mut bend = [0.0; MAX_BODIES];
             for (body, bend) in bend.iter_mut().enumerate().take(world.bodies.bodies.len()) {
-                *bend = world.reach.bend(body, &way);
+                *bend = world.reach.bend(body, &travel);
             }
             bends.push(bend);
         }
         let postures = path.iter().map(|q| Posture::of(world, q)).collect();
-        Self { world, path, contact, postures, ways, bends }
+        Self { world, path, contact, postures, travelled, bends }
     }
 
     /// Where the path collides, or is not proven.
@@ -202,11 +187,11 @@ impl<'a> Proof<'a> {
     /// `from` and `to`.
     fn slack(&self, moves: u32, from: usize, at: usize, to: usize) -> Slack<'a> {
         let reach = &self.world.reach;
-        let way: JointVector = JointVector::from_fn(|j| {
-            let here = self.ways[at][j];
-            (here - self.ways[from][j]).max(self.ways[to][j] - here)
+        let travel: JointVector = JointVector::from_fn(|j| {
+            let here = self.travelled[at][j];
+            (here - self.travelled[from][j]).max(self.travelled[to][j] - here)
         });
-        let mut slack = Slack::new(reach, way);
+        let mut slack = Slack::new(reach, travel);
         for body in each(moves) {
             let of = |k: usize| {
                 let posture = &self.postures[k];
@@ -214,7 +199,7 @@ impl<'a> Proof<'a> {
             };
             let chord = (from..=to).map(|k| reach.chord(body, of(at), of(k))).fold(0.0, f64::max);
             let bend = self.bends[from..to].iter().map(|bend| bend[body]).fold(0.0, f64::max);
-            slack.body[body] = (chord + bend).min(reach.way(body, &way));
+            slack.body[body] = (chord + bend).min(reach.displacement(body, &travel));
         }
         slack
     }
@@ -230,9 +215,10 @@ impl<'a> Proof<'a> {
     ) -> Slack<'a> {
         let reach = &self.world.reach;
         let half = 0.5 * share;
-        let way: JointVector =
-            JointVector::from_fn(|j| half * (self.ways[knot + 1][j] - self.ways[knot][j]));
-        let mut slack = Slack::new(reach, way);
+        let travel: JointVector = JointVector::from_fn(|j| {
+            half * (self.travelled[knot + 1][j] - self.travelled[knot][j])
+        });
+        let mut slack = Slack::new(reach, travel);
         for body in each(moves) {
             let of = |posture: &'_ Posture| (posture.poses[body], posture.centres[body]);
             let (frame, centre) = of(middle);
@@ -241,7 +227,8 @@ impl<'a> Proof<'a> {
                 reach.chord(body, (&frame, &centre), (&end, &end_centre))
             });
             let bend = self.bends[knot][body] * half * half;
-            slack.body[body] = (chord.fold(0.0, f64::max) + bend).min(reach.way(body, &way));
+            slack.body[body] =
+                (chord.fold(0.0, f64::max) + bend).min(reach.displacement(body, &travel));
         }
         slack
     }

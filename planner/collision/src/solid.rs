@@ -1,14 +1,19 @@
-//! Convex solids in their own frame: signed distances for the fast check, parry's shapes for GJK.
+//! Convex solids in their own frame, made of the shapes that a URDF describes: signed distances for
+//! the fast check, parry's shapes for both.
 
-use nalgebra::{Point3, Vector3};
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nullsweep_robot::Geometry;
 use parry3d_f64::math::Vec3;
-use parry3d_f64::query::PointQuery;
+use parry3d_f64::query::{DefaultQueryDispatcher, PointQuery, QueryDispatcher};
 use parry3d_f64::shape::{ConvexPolyhedron, SharedShape};
 
 use crate::frame::Frame;
+use crate::mesh::{MeshError, MeshPaths, read_stl};
 
 /// A convex solid about its own origin; lengths in \[m\].
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(crate) enum Solid {
     Ball {
         radius: f64,
@@ -18,7 +23,7 @@ pub(crate) enum Solid {
         half: f64,
         radius: f64,
     },
-    /// Axis y, as parry has it: a URDF cylinder (axis z) is turned where it is read.
+    /// Axis y, as parry has it: [`Solid::prepare`] turns a URDF's cylinder (axis z).
     Cylinder {
         half: f64,
         radius: f64,
@@ -32,7 +37,7 @@ pub(crate) enum Solid {
 }
 
 /// A convex polyhedron with its face planes.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(crate) struct Hull {
     shape: ConvexPolyhedron,
     /// Outward unit normal and offset of each face; every vertex satisfies n·v ≤ offset.
@@ -75,6 +80,34 @@ impl Hull {
 }
 
 impl Solid {
+    /// The solid of a shape that stands at `origin`, and where the solid stands in the same frame:
+    /// a cylinder turns. A mesh is read from its file and becomes its convex hull.
+    pub(crate) fn prepare(
+        geometry: &Geometry,
+        origin: Isometry3<f64>,
+        meshes: &MeshPaths,
+    ) -> Result<(Self, Isometry3<f64>), MeshError> {
+        let solid = match geometry {
+            Geometry::Box { half_extents } => Self::Box { half: *half_extents },
+            Geometry::Sphere { radius } => Self::Ball { radius: *radius },
+            Geometry::Capsule { radius, half_length } => {
+                Self::Capsule { half: *half_length, radius: *radius }
+            }
+            Geometry::Cylinder { radius, half_length } => {
+                let quarter = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2);
+                let solid = Self::Cylinder { half: *half_length, radius: *radius };
+                return Ok((solid, origin * quarter));
+            }
+            Geometry::Mesh { uri, scale } => {
+                let path = meshes.resolve(uri)?;
+                let points = read_stl(&path, scale)?;
+                let flat = || MeshError::Flat { path, vertices: points.len() };
+                Self::Hull(Box::new(Hull::new(&points).ok_or_else(flat)?))
+            }
+        };
+        Ok((solid, origin))
+    }
+
     /// A lower bound of the signed distance \[m\] from `p` to the solid (negative inside). Exact for
     /// all but a hull's edges and vertices as seen from outside.
     #[inline]
@@ -196,4 +229,11 @@ impl Solid {
             Self::HalfSpace => SharedShape::halfspace(Vec3::new(0.0, 0.0, 1.0)),
         }
     }
+}
+
+/// Distance between two shapes, the second at `pose` in the first's frame; 0 if they overlap. \[m\]
+pub(crate) fn gjk_distance(pose: &Frame, first: &SharedShape, second: &SharedShape) -> f64 {
+    DefaultQueryDispatcher
+        .distance(&pose.to_parry(), &**first, &**second)
+        .map_or(0.0, |found| found.distance)
 }

@@ -41,8 +41,8 @@ mod tests {
     use std::f64::consts::PI;
 
     use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-    use nullsweep_collision::{self as collision, Obstacle, ObstacleShape, ToolContact, World};
-    use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Solutions, Tool};
+    use nullsweep_collision::{self as collision, Obstacle, ToolContact, World};
+    use nullsweep_robot::{Arm, ArmSpec, Geometry, Robot, Side, Solutions, Tool};
 
     use super::super::retreat::retract;
     use super::super::rrt_connect::length;
@@ -65,7 +65,7 @@ mod tests {
         }
         let post = Obstacle {
             name: "post".into(),
-            shape: ObstacleShape::Box { half_extents: Vector3::new(0.06, 0.02, 0.25) },
+            shape: Geometry::Box { half_extents: Vector3::new(0.06, 0.02, 0.25) }.into(),
             pose: Isometry3::translation(0.63, -0.2, 0.85),
             carries_robot: false,
         };

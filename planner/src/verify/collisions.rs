@@ -17,7 +17,7 @@ const LIFT_SLACK: f64 = 0.002;
 pub(super) fn collisions(
     plan: &Plan,
     arm: &Arm,
-    exact: &Exact<'_>,
+    exact: &Exact,
     tick: &(dyn Fn() + Sync),
 ) -> (Vec<Violation>, usize) {
     let lifts = lifts(plan, arm);

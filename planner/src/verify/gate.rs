@@ -1,7 +1,7 @@
 //! The check as a whole.
 
 use nalgebra::{Isometry3, Point3};
-use nullsweep_collision::{CollisionError, Options, World};
+use nullsweep_collision::{CollisionError, Exact, Options};
 use nullsweep_robot::{Arm, ArmError, ArmSpec, Robot};
 use nullsweep_surface::{Scan, Surface};
 use rayon::prelude::*;
@@ -103,8 +103,8 @@ pub fn verify(
         return Ok(Verification { violations, ..Verification::default() });
     }
     let (points, obstacles) = (scene.points(), &scene.obstacles);
-    let world = World::new(given.robot, &arm, &plan.tool, &points, obstacles, given.collision)?;
-    let (collisions, collision_checks) = collisions(plan, &arm, &world.exact(), tick);
+    let exact = Exact::new(given.robot, &arm, &plan.tool, &points, obstacles, given.collision)?;
+    let (collisions, collision_checks) = collisions(plan, &arm, &exact, tick);
     violations.extend(collisions);
     violations.sort_by_key(|v| v.knot);
 

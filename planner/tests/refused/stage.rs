@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
-use nullsweep_collision::{Obstacle, ObstacleShape, Options, World};
+use nullsweep_collision::{Obstacle, Options, World};
 use nullsweep_planner::cost::velocities;
 use nullsweep_planner::pipeline::{Job, StanceChoice, run};
 use nullsweep_planner::plan::{Plan, PlanKnot};
@@ -11,7 +11,7 @@ use nullsweep_planner::progress::Silent;
 use nullsweep_planner::timing::{Limits, accelerate, bang_bang};
 use nullsweep_planner::verify::{Given, Verification, verify};
 use nullsweep_planner::workcell::{Scene, Stance, Workcell};
-use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Tool};
+use nullsweep_robot::{Arm, ArmSpec, Geometry, JointVector, Robot, Side, Tool};
 use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
 
 /// A real plan for the chair's seat and all that it was made for.
@@ -70,7 +70,7 @@ pub(crate) fn stage() -> &'static Stage {
 /// The stage's scene with a box in it, placed in the root frame.
 pub(crate) fn scene_with(name: &str, half_extents: Vector3<f64>, centre: Vector3<f64>) -> Scene {
     let s = stage();
-    let shape = ObstacleShape::Box { half_extents };
+    let shape = Geometry::Box { half_extents }.into();
     let pose = s.bang.base_pose() * Isometry3::translation(centre.x, centre.y, centre.z);
     let more = Obstacle { name: name.into(), shape, pose, carries_robot: false };
     let mut scene = s.scene.clone();

@@ -113,8 +113,9 @@ const PLANNER: &[(&str, &[&str])] = &[
 
 #[rustfmt::skip]
 const COLLISION: &[&str] = &[
-    "rules", "frame", "mesh", "srdf", "solid", "spheres", "sieve", "field", "bodies", "parts",
-    "scene", "shapes", "motion", "exact", "pairs", "never", "world", "check", "proof", "clearance",
+    "frame", "rules", "mesh", "srdf", "error", "options", "obstacle",
+    "solid", "spheres", "sieve", "field", "bodies", "parts", "shapes", "pairs", "scene", "exact",
+    "fixed", "moving", "motion", "never", "world", "check", "proof",
 ];
 
 const SURFACE: &[&str] = &["grid", "fit", "scan", "simulate", "sheet", "patches"];
@@ -126,6 +127,7 @@ pub(crate) const APART: &[(&str, &str, &[&str])] = &[
     ("planner/src", "roadmap", &["verify"]),
     ("planner/src", "tour", &["verify"]),
     ("planner/src", "motion", &["verify"]),
+    ("planner/collision/src", "exact", &["frame", "spheres", "sieve", "field", "bodies"]),
 ];
 
 /// Libraries of others, and the only folders that may name them.

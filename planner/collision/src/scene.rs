@@ -1,0 +1,112 @@
+//! What both checks are built from: the robot's parts, the pairs of them to check, the scan's points
+//! and the obstacles.
+
+use nalgebra::{Isometry3, Point3};
+use nullsweep_robot::{Arm, Robot, Tool};
+use parry3d_f64::shape::SharedShape;
+
+use crate::bodies::{Bodies, MAX_BODIES};
+use crate::error::CollisionError;
+use crate::mesh::MeshPaths;
+use crate::obstacle::{Obstacle, ObstacleShape};
+use crate::options::Options;
+use crate::pairs::{self, Pairs};
+use crate::parts::{self, Part};
+use crate::rules::Margins;
+use crate::solid::Solid;
+
+/// A robot with its tool, scan and obstacles, all shapes prepared; in the root frame.
+pub(crate) struct Scene {
+    /// How many links the robot has.
+    pub(crate) links: usize,
+    pub(crate) parts: Vec<Part>,
+    /// For each part: does it move with the arm?
+    pub(crate) moves: Vec<bool>,
+    /// For each part: is it rigid to the tip?
+    pub(crate) at_tip: Vec<bool>,
+    pub(crate) pairs: Pairs,
+    pub(crate) points: Vec<Point3<f64>>,
+    pub(crate) obstacles: Vec<PreparedObstacle>,
+    pub(crate) tool: Tool,
+    pub(crate) margins: Margins,
+    /// What was made up, in words.
+    pub(crate) notes: Vec<String>,
+}
+
+/// An obstacle whose shape is read and ready.
+pub(crate) struct PreparedObstacle {
+    pub(crate) name: String,
+    pub(crate) solid: Solid,
+    /// The same for parry.
+    pub(crate) shape: SharedShape,
+    pub(crate) pose: Isometry3<f64>,
+    pub(crate) carries_robot: bool,
+}
+
+impl Scene {
+    /// Reads and sorts everything; also the driven bodies that the parts hang on.
+    pub(crate) fn prepare(
+        robot: &Robot,
+        arm: &Arm,
+        tool: &Tool,
+        points: &[Point3<f64>],
+        obstacles: &[Obstacle],
+        options: &Options,
+    ) -> Result<(Self, Bodies), CollisionError> {
+        check_input(points, &options.margins)?;
+        let bodies = Bodies::new(robot, arm)
+            .map_err(|count| CollisionError::TooManyBodies { count, most: MAX_BODIES })?;
+        let (parts, notes) = parts::collect(robot, arm, tool, options)?;
+        let pairs = pairs::find(robot, arm, &bodies, &parts, options)?;
+        let obstacles = obstacles
+            .iter()
+            .map(|obstacle| PreparedObstacle::new(obstacle, &options.meshes))
+            .collect::<Result<_, _>>()?;
+        let body_of = |part: &Part| bodies.carrier(part.link).0;
+        let scene = Self {
+            links: robot.links().len(),
+            moves: parts.iter().map(|part| body_of(part).is_some()).collect(),
+            at_tip: parts.iter().map(|part| body_of(part) == Some(bodies.tip_body)).collect(),
+            parts,
+            pairs,
+            points: points.to_vec(),
+            obstacles,
+            tool: tool.clone(),
+            margins: options.margins,
+            notes,
+        };
+        Ok((scene, bodies))
+    }
+}
+
+impl PreparedObstacle {
+    fn new(obstacle: &Obstacle, meshes: &MeshPaths) -> Result<Self, CollisionError> {
+        let Obstacle { name, shape, pose, carries_robot } = obstacle;
+        let (solid, pose) = match shape {
+            ObstacleShape::Floor => (Solid::HalfSpace, *pose),
+            ObstacleShape::Geometry(geometry) => Solid::prepare(geometry, *pose, meshes)
+                .map_err(|error| CollisionError::ObstacleMesh { obstacle: name.clone(), error })?,
+        };
+        let shape = solid.to_parry();
+        Ok(Self { name: name.clone(), solid, shape, pose, carries_robot: *carries_robot })
+    }
+}
+
+fn check_input(points: &[Point3<f64>], margins: &Margins) -> Result<(), CollisionError> {
+    for (name, value) in [
+        ("self_clearance", margins.self_clearance),
+        ("environment", margins.environment),
+        ("contact_growth", margins.contact_growth),
+        ("contact_front", margins.contact_front),
+        ("contact_clearance", margins.contact_clearance),
+        ("contact_depth", margins.contact_depth),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(CollisionError::Margin { name, value });
+        }
+    }
+    match points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        Some(index) => Err(CollisionError::NotFinite { index }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,126 @@
+//! What the checks are built from.
+
+use super::*;
+use crate::frame::Frame;
+
+#[test]
+fn bodies_follow_the_robot_crate() {
+    let (robot, arm, tool) = pr2();
+    let world = World::new(&robot, &arm, &tool, &[], &[], &Options::default()).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut links = vec![Isometry3::identity(); robot.links().len()];
+    for _ in 0..200 {
+        let q = random_configuration(&arm, &mut rng);
+        arm.link_poses(&q, &mut links);
+        let poses = world.bodies.poses(&q);
+        for (pose, (body, frame)) in links.iter().zip(&world.bodies.links) {
+            let ours = body.map_or(*frame, |b| poses[b].then(frame));
+            let theirs = Frame::from(pose);
+            assert!((ours.translation - theirs.translation).norm() < 1e-12);
+            assert!((ours.rotation - theirs.rotation).norm() < 1e-12);
+        }
+        let tip = poses[world.bodies.tip_body].then(&world.bodies.tip).translation;
+        assert!((tip - arm.tip_pose(&q).translation.vector).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn not_a_number_is_never_free() {
+    let (arm, _, _, world) = pr2_world(100);
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut q = arm.home();
+        q[3] = bad;
+        assert!(!world.is_free(&q, ToolContact::Forbidden));
+        assert!(!world.exact().is_free(&q, ToolContact::Forbidden));
+        assert!(!world.motion_free(&arm.home(), &q, ToolContact::Forbidden));
+    }
+    let (robot, arm, tool) = pr2();
+    let scan = [Point3::new(0.0, f64::NAN, 0.0)];
+    let world = World::new(&robot, &arm, &tool, &scan, &[], &Options::default());
+    assert!(matches!(world, Err(CollisionError::NotFinite { index: 0 })));
+}
+
+#[test]
+fn the_floor_carries_the_robot_but_stops_the_arm() {
+    let (robot, arm, tool) = pr2();
+    let floor = Obstacle::floor(Isometry3::identity());
+    let world = World::new(&robot, &arm, &tool, &[], &[floor], &Options::default()).unwrap();
+    assert_eq!(world.stance_hit(), None);
+    let raised = Obstacle::floor(Isometry3::translation(0.0, 0.0, 3.0));
+    let world = World::new(&robot, &arm, &tool, &[], &[raised], &Options::default()).unwrap();
+    let hit = world.why_not(&arm.home(), ToolContact::Allowed).unwrap();
+    assert_eq!(hit.with, With::Obstacle("floor".into()));
+    assert!(!world.is_free(&arm.home(), ToolContact::Allowed));
+    // A point inside the base is a matter of the stance.
+    let scan = [Point3::new(0.0, 0.0, 0.2)];
+    let world = World::new(&robot, &arm, &tool, &scan, &[], &Options::default()).unwrap();
+    let hit = world.stance_hit().unwrap();
+    assert!(hit.link == "base_link" && hit.distance < 0.0, "{hit}");
+}
+
+#[test]
+fn the_exact_check_alone_says_what_the_worlds_says() {
+    let (robot, arm, tool) = pr2();
+    let (scan, options) = (wall(300, 3), Options::default());
+    let obstacles = [table(), Obstacle::floor(Isometry3::identity())];
+    let alone = Exact::new(&robot, &arm, &tool, &scan, &obstacles, &options).unwrap();
+    let world = World::new(&robot, &arm, &tool, &scan, &obstacles, &options).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(14);
+    let mut free = 0;
+    for _ in 0..300 {
+        let q = random_configuration(&arm, &mut rng);
+        let hit = alone.first_hit(&q, ToolContact::Forbidden);
+        assert_eq!(hit, world.exact().first_hit(&q, ToolContact::Forbidden));
+        assert_eq!(alone.is_free(&q, ToolContact::Forbidden), hit.is_none());
+        free += usize::from(hit.is_none());
+    }
+    assert!((10..290).contains(&free), "{free} of 300 free");
+    assert_eq!(alone.stance_hit(), None);
+    let inside = [Point3::new(0.0, 0.0, 0.2)];
+    let alone = Exact::new(&robot, &arm, &tool, &inside, &[], &options).unwrap();
+    assert_eq!(alone.stance_hit().unwrap().with, With::ScanPoint(inside[0]));
+}
+
+#[test]
+fn an_obstacle_may_have_any_shape_that_a_urdf_has() {
+    let (robot, arm, tool) = pr2();
+    let tip = arm.tip_pose(&arm.home());
+    let folder = tempfile::tempdir().unwrap();
+    write_blob(&folder.path().join("blob.stl"), Vector3::repeat(0.1), Vector3::zeros(), 5);
+    let mut options = Options::default();
+    options.meshes.relative_to = folder.path().into();
+    for shape in [
+        Geometry::Box { half_extents: Vector3::repeat(0.1) },
+        Geometry::Sphere { radius: 0.1 },
+        Geometry::Cylinder { radius: 0.1, half_length: 0.1 },
+        Geometry::Capsule { radius: 0.1, half_length: 0.1 },
+        Geometry::Mesh { uri: "blob.stl".into(), scale: Vector3::repeat(1.0) },
+    ] {
+        let text = format!("{shape:?}");
+        let obstacle =
+            Obstacle { name: "thing".into(), shape: shape.into(), pose: tip, carries_robot: false };
+        let world = World::new(&robot, &arm, &tool, &[], &[obstacle], &options).unwrap();
+        let hit = world.why_not(&arm.home(), ToolContact::Allowed).unwrap();
+        assert_eq!(hit.with, With::Obstacle("thing".into()), "{text}");
+        assert!(!world.is_free(&arm.home(), ToolContact::Allowed), "{text}");
+    }
+    // A cylinder lies along z of its pose: 1 m long, it is far from the tip across, not along.
+    let rod = |across: f64, along: f64| {
+        let shape = Geometry::Cylinder { radius: 0.02, half_length: 0.5 }.into();
+        let pose = Isometry3::translation(across, 0.0, along) * Isometry3::from(tip.translation);
+        let rod = Obstacle { name: "rod".into(), shape, pose, carries_robot: false };
+        let world = World::new(&robot, &arm, &tool, &[], &[rod], &options).unwrap();
+        let free = world.is_free(&arm.home(), ToolContact::Allowed);
+        assert_eq!(free, world.exact().is_free(&arm.home(), ToolContact::Allowed));
+        free
+    };
+    assert!(!rod(0.0, 0.45) && rod(0.45, 0.0));
+    let missing = Obstacle {
+        name: "gone".into(),
+        shape: Geometry::Mesh { uri: "gone.stl".into(), scale: Vector3::repeat(1.0) }.into(),
+        pose: tip,
+        carries_robot: false,
+    };
+    let error = Exact::new(&robot, &arm, &tool, &[], &[missing], &options).unwrap_err();
+    assert!(matches!(error, CollisionError::ObstacleMesh { obstacle, .. } if obstacle == "gone"));
+}
