@@ -95,9 +95,9 @@ fn parse(text: &str) -> Result<Srdf, String> {
             _ => continue,
         };
         let (kind, [a, b]) = match element.name().as_ref() {
-            b"disable_collisions" => ("disable_collisions", ["link1", "link2"]),
-            b"group_state" => ("group_state", ["name", "group"]),
-            b"joint" if inside.is_some() => ("joint", ["name", "value"]),
+            "disable_collisions" => ("disable_collisions", ["link1", "link2"]),
+            "group_state" => ("group_state", ["name", "group"]),
+            "joint" if inside.is_some() => ("joint", ["name", "value"]),
             _ => continue,
         };
         let lacks = || format!("{kind} near byte {at} lacks {a} or {b}");
@@ -136,8 +136,8 @@ fn attributes(
     let mut values = [None, None];
     for attribute in element.attributes() {
         let attribute = attribute?;
-        if let Some(k) = names.iter().position(|n| n.as_bytes() == attribute.key.as_ref()) {
-            values[k] = Some(String::from_utf8_lossy(&attribute.value).into_owned());
+        if let Some(k) = names.iter().position(|n| *n == attribute.key.as_ref()) {
+            values[k] = Some(attribute.value.into_owned());
         }
     }
     let [first, second] = values;

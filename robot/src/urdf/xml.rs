@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 
 use quick_xml::Reader;
+use quick_xml::escape::unescape;
 use quick_xml::events::{BytesStart, Event};
 
 /// What the text of one `<joint>` holds.
@@ -28,7 +29,7 @@ pub(crate) struct JointFacts {
 pub(crate) fn joint_facts(text: &str) -> Result<HashMap<String, JointFacts>, String> {
     let mut reader = Reader::from_str(text);
     let mut facts = HashMap::new();
-    let mut path: Vec<Vec<u8>> = Vec::new();
+    let mut path: Vec<String> = Vec::new();
     let mut current = String::new();
     loop {
         let event = reader
@@ -44,20 +45,19 @@ pub(crate) fn joint_facts(text: &str) -> Result<HashMap<String, JointFacts>, Str
             Event::Eof => return Ok(facts),
             _ => continue,
         };
-        let name = element.name().as_ref().to_vec();
-        let parent = path.last().map(Vec::as_slice);
-        if path.len() == 1 && name == b"joint" {
+        let name = element.name().as_ref().to_owned();
+        let parent = path.last().map(String::as_str);
+        if path.len() == 1 && name == "joint" {
             current = attribute(element, "name")?.unwrap_or_default();
             facts.entry(current.clone()).or_default();
-        } else if path.len() == 2 && parent == Some(b"joint") {
+        } else if path.len() == 2 && parent == Some("joint") {
             read_joint_child(element, &name, facts.entry(current.clone()).or_default())?;
         }
         for key in ["xyz", "rpy", "size", "scale"] {
             if let Some(value) = attribute(element, key)? {
                 let words = value.split_whitespace();
                 if words.clone().count() != 3 || !words.clone().all(|w| w.parse::<f64>().is_ok()) {
-                    let tag = String::from_utf8_lossy(&name).into_owned();
-                    return Err(format!("{key}=\"{value}\" of <{tag}> must be three numbers"));
+                    return Err(format!("{key}=\"{value}\" of <{name}> must be three numbers"));
                 }
             }
         }
@@ -69,11 +69,11 @@ pub(crate) fn joint_facts(text: &str) -> Result<HashMap<String, JointFacts>, Str
 
 fn read_joint_child(
     element: &BytesStart<'_>,
-    name: &[u8],
+    name: &str,
     facts: &mut JointFacts,
 ) -> Result<(), String> {
     match name {
-        b"limit" => {
+        "limit" => {
             facts.has_limit = true;
             facts.has_range =
                 attribute(element, "lower")?.is_some() || attribute(element, "upper")?.is_some();
@@ -85,7 +85,7 @@ fn read_joint_child(
                 facts.acceleration = Some(value);
             }
         }
-        b"safety_controller" => {
+        "safety_controller" => {
             facts.has_soft_range = attribute(element, "soft_lower_limit")?.is_some()
                 || attribute(element, "soft_upper_limit")?.is_some();
             facts.has_k_position = attribute(element, "k_position")?.is_some();
@@ -99,5 +99,5 @@ fn attribute(element: &BytesStart<'_>, key: &str) -> Result<Option<String>, Stri
     let Some(found) = element.try_get_attribute(key).map_err(|e| e.to_string())? else {
         return Ok(None);
     };
-    found.unescape_value().map(|v| Some(v.into_owned())).map_err(|e| e.to_string())
+    unescape(&found.value).map(|v| Some(v.into_owned())).map_err(|e| e.to_string())
 }
