@@ -1,9 +1,13 @@
 //! The serial chain of an arm, folded for speed: one fixed transform and one axis a joint.
 
-use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, SMatrix, UnitQuaternion, Vector3};
 use wide::f64x4;
 
-use crate::{Jacobian, JointVector, MAX_DOF};
+use crate::{JointVector, MAX_DOF};
+
+/// Geometric Jacobian: rows linear x, y, z [m/s], angular x, y, z [rad/s] of the tip in the root
+/// frame; one column a joint, unused columns zero.
+pub type Jacobian = SMatrix<f64, 6, MAX_DOF>;
 
 /// Root frame → joint 1 → … → joint n → tip. Everything that does not move with the arm's own
 /// joints is folded into the fixed transform before the next joint.

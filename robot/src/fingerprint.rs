@@ -2,7 +2,7 @@
 
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::arm::ArmSpec;
+use crate::spec::ArmSpec;
 use crate::urdf::{Joint, JointKind, Model};
 
 /// Version of the canonical form below; part of the hash.

@@ -36,7 +36,7 @@ impl JointVector {
         Self(std::array::from_fn(value))
     }
 
-    /// The vector `share` 0…1 of the way along the straight line to another one.
+    /// The vector at `share` 0…1 of the straight line to another one.
     #[must_use]
     #[inline]
     pub fn lerp(&self, to: &Self, share: f64) -> Self {
@@ -150,7 +150,7 @@ impl Continuous {
         self.0[joint]
     }
 
-    /// How far each joint moves from `a` to `b`, continuous ones the short way round, without a
+    /// How far each joint moves from `a` to `b`, continuous ones the shorter way round, without a
     /// sign. \[rad\] or \[m\]
     #[must_use]
     #[inline]
@@ -160,6 +160,13 @@ impl Continuous {
             let turns = if self.0[j] { (raw / TAU).round() } else { 0.0 };
             (raw - turns * TAU).abs()
         })
+    }
+
+    /// Whole turns of the continuous joints, those that bring `q` nearest to `near`. \[rad\]
+    #[must_use]
+    pub fn turns_to(&self, q: &JointVector, near: &JointVector) -> JointVector {
+        let turns = q.turns_to(near);
+        JointVector::from_fn(|j| if self.0[j] { turns[j] } else { 0.0 })
     }
 
     /// `q` with whole turns of its continuous joints taken away so that it is nearest to `near`.
@@ -176,9 +183,23 @@ impl Continuous {
 #[must_use]
 #[inline]
 pub fn wrap(angle: f64) -> f64 {
+    // Nearly always true, and rounding is a call where the processor has no instruction for it.
+    if angle > -PI && angle <= PI {
+        return angle;
+    }
     let wrapped = angle - (angle / TAU).round() * TAU;
     // Half a turn rounds either way.
     if wrapped <= -PI { wrapped + TAU } else { wrapped }
+}
+
+/// The same angle, by whole turns nearest to `near`. \[rad\]
+#[inline]
+pub(crate) fn unwrap_near(angle: f64, near: f64) -> f64 {
+    let ahead = near - angle;
+    if ahead.abs() <= PI {
+        return angle;
+    }
+    angle + (ahead / TAU).round_ties_even() * TAU
 }
 
 #[cfg(test)]
@@ -191,6 +212,14 @@ mod tests {
         {
             assert!((wrap(angle) - wanted).abs() < 1e-12, "{angle}: {}", wrap(angle));
         }
+        assert_eq!((wrap(PI), wrap(-PI)), (PI, PI));
+        assert!((wrap(-100.0) + 100.0 - 16.0 * TAU).abs() < 1e-12);
+    }
+
+    #[test]
+    fn whole_turns_bring_an_angle_near_another_one() {
+        assert!((unwrap_near(0.1, 13.0) - (0.1 + 2.0 * TAU)).abs() < 1e-12);
+        assert_eq!(unwrap_near(3.0, 0.0), 3.0);
     }
 
     #[test]
@@ -204,6 +233,7 @@ mod tests {
         assert_eq!((d[0], d[1]), (6.0, TAU - 6.0));
         let near = continuous.nearest_turn(&b, &a);
         assert_eq!((near[0], near[1]), (-3.0, -3.0 + TAU));
+        assert_eq!(b + continuous.turns_to(&b, &a), near);
         assert_eq!(a.lerp(&b, 0.5), JointVector::ZERO);
         assert!((a.distance(&b) - 6.0 * (MAX_DOF as f64).sqrt()).abs() < 1e-12);
     }

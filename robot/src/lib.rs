@@ -11,10 +11,12 @@
 //! # Ok::<(), nullsweep_robot::ArmError>(())
 //! ```
 //!
-//! The way through the crate: `urdf` (text to tree) → `arm` (tree to serial chain, poses,
-//! Jacobian) → `limits` (soft limits and the braking margin that planner and executor share) →
-//! `ik` (closed forms for arms of known shapes, numeric for all others). `fingerprint` names a robot
-//! and arm in 64 bits so that a plan reaches only the robot it was made for.
+//! Read the modules in this order, from the bottom: `urdf` (text to tree), `limits` (soft limits
+//! and the braking margin that planner and executor share), `joints` (joint vectors), `chain`
+//! (serial chain, poses, Jacobian), `ik` (closed forms for arms of known shapes, numeric for all
+//! others), `arm` (tree and [`ArmSpec`] to chain and solvers). `fingerprint` names a robot and arm
+//! in 64 bits so that a plan reaches only the robot it was made for. `pr2` is the PR2's own
+//! description, `tool` the pad at the end of the arm.
 //!
 //! Everything speaks the robot's *root frame* (the one link without a parent joint; the PR2's
 //! base_footprint: z up, x ahead) in SI units: metres, radians, seconds.
@@ -26,14 +28,19 @@ mod ik;
 mod joints;
 mod limits;
 mod pr2;
+mod spec;
 mod tool;
 mod urdf;
 
-pub use arm::{Arm, ArmError, ArmSpec, HeldJoint, Jacobian};
-pub use ik::{Branch, InverseKinematics, RedundantJoint, Solution, Solutions};
+pub use arm::{Arm, ArmError};
+pub use chain::Jacobian;
+pub use ik::{
+    Branch, InverseKinematics, RedundantJoint, Solution, Solutions, damped_step, pose_error,
+};
 pub use joints::{Continuous, JointVector, MAX_DOF, wrap};
-pub use limits::{JointLimits, LimitsError};
+pub use limits::JointLimits;
 pub use pr2::Side;
+pub use spec::{ArmSpec, HeldJoint};
 pub use tool::{Mounted, Tool};
 pub use urdf::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, Robot, SafetyController,

@@ -1,6 +1,6 @@
 //! The PR2: our own URDF of it, its two arms and its postures.
 
-use crate::arm::ArmSpec;
+use crate::spec::ArmSpec;
 use crate::urdf::Robot;
 
 /// An arm of the PR2.

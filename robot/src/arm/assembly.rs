@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::HeldJoint;
 use crate::chain::{Chain, Step, about};
+use crate::spec::HeldJoint;
 use crate::urdf::{JointKind, Model};
 
 /// A link's pose from its parent's.

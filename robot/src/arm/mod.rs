@@ -5,39 +5,18 @@ mod error;
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, SMatrix};
+use nalgebra::Isometry3;
 
-use crate::chain::Chain;
+use crate::chain::{Chain, Jacobian};
 use crate::fingerprint::fingerprint;
 use crate::ik::{InverseKinematics, Numeric, RedundantJoint, Solvers, spread_over};
-use crate::limits::{JointLimits, LimitsError, apply_toml};
+use crate::limits::JointLimits;
+use crate::spec::{ArmSpec, HeldJoint};
 use crate::urdf::{Joint, JointKind, Model, Robot};
 use crate::{Continuous, JointVector, MAX_DOF, pr2};
 use assembly::{Motion, Placement, Values, build_chain, build_placements, motion_of};
 
 pub use error::ArmError;
-
-/// Geometric Jacobian: rows linear x, y, z [m/s], angular x, y, z [rad/s] of the tip in the root
-/// frame; one column a joint, unused columns zero.
-pub type Jacobian = SMatrix<f64, 6, MAX_DOF>;
-
-/// Which part of a robot is the arm: the movable joints between two links.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ArmSpec {
-    /// Link that carries the arm.
-    pub base: String,
-    /// Link whose frame is the tip.
-    pub tip: String,
-}
-
-/// A movable joint of the robot that the arm does not move.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeldJoint {
-    /// Name of the joint.
-    pub name: String,
-    /// Where it is held. [rad or m]
-    pub position: f64,
-}
 
 /// A serial arm with all other joints of the robot held.
 ///
@@ -160,25 +139,10 @@ impl Arm {
             }
             slot.position = position;
         }
-        Ok(self.changed(self.limits.clone(), held))
-    }
-
-    /// The same arm with limits from a file: one table a joint with `velocity` (at most the
-    /// URDF's), `acceleration`, or both.
-    ///
-    /// ```toml
-    /// [r_wrist_flex_joint]
-    /// velocity = 2.0       # rad/s
-    /// acceleration = 10.0  # rad/s²
-    /// ```
-    ///
-    /// # Errors
-    /// When the text is not such a file, names a joint that the arm does not move, or holds a
-    /// value out of range.
-    pub fn with_limits_toml(&self, text: &str) -> Result<Self, LimitsError> {
-        let mut limits = self.limits.clone();
-        apply_toml(text, &self.names, &mut limits)?;
-        Ok(self.changed(limits, self.held.clone()))
+        let index = |name: &String| self.model.joints.iter().position(|j| j.name == *name);
+        let active: Vec<usize> = self.names.iter().filter_map(index).collect();
+        let (model, spec) = (self.model.clone(), self.spec.clone());
+        Ok(Self::assemble(model, spec, &active, self.limits.clone(), held))
     }
 
     /// 64 bits that name the robot's kinematics and this arm, whatever the held positions.
@@ -293,12 +257,6 @@ impl Arm {
     /// Same kinematics as the PR2's and its joint names.
     fn is_pr2(&self) -> bool {
         self.solvers.is_pr2_shaped() && self.names.iter().all(|n| pr2::ready(n).is_some())
-    }
-
-    fn changed(&self, limits: Vec<JointLimits>, held: Vec<HeldJoint>) -> Self {
-        let index = |name: &String| self.model.joints.iter().position(|j| j.name == *name);
-        let active: Vec<usize> = self.names.iter().filter_map(index).collect();
-        Self::assemble(self.model.clone(), self.spec.clone(), &active, limits, held)
     }
 
     fn assemble(

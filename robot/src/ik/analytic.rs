@@ -10,17 +10,17 @@
 //! come to lie in one line (the wrist straight, the wrist centre on the first axis), one of both
 //! angles keeps its value.
 
-use std::f64::consts::PI;
-
 use nalgebra::Isometry3;
 
+use super::damped::{damped_step_over, pose_error};
 use super::folds::same;
-use super::numeric::{damped_step, pose_error};
+use super::redundancy::Redundancy;
 use super::six::{Kind, Question, Shape};
+use super::solution::{Branch, InverseKinematics, Solution, Solutions};
 use super::subproblem::Slack;
-use super::{Branch, InverseKinematics, Solution, Solutions};
 use crate::chain::{Chain, JointAxis};
-use crate::limits::{JointLimits, unwrap_near, wrap};
+use crate::joints::{unwrap_near, wrap};
+use crate::limits::JointLimits;
 use crate::{JointVector, MAX_DOF};
 
 /// The solver. Branch: bit 5 is its mark, bits 0 to 2 say which of two angles each of three
@@ -30,7 +30,7 @@ pub(crate) struct Analytic {
     chain: Chain,
     limits: Vec<JointLimits>,
     margined: Vec<(f64, f64)>,
-    redundant: Option<usize>,
+    redundancy: Redundancy,
     kind: Kind,
     /// The free joints in the order in which `kind` takes them, and whether that is from tip to
     /// base.
@@ -95,7 +95,7 @@ impl Analytic {
             chain: chain.clone(),
             limits: limits.to_vec(),
             margined: margined.to_vec(),
-            redundant,
+            redundancy: Redundancy::new(redundant, margined, |joint| limits[joint].continuous),
             kind,
             joints,
             backwards,
@@ -114,7 +114,7 @@ impl Analytic {
         mut found: impl FnMut(u8, JointVector),
     ) {
         let mut zero = JointVector::ZERO;
-        self.hold(&mut zero, redundancy);
+        self.redundancy.hold(&mut zero, redundancy);
         let (tip, axes) = self.chain.axes(&zero);
         let motion = target * tip.inverse();
         let question = Question {
@@ -151,12 +151,6 @@ impl Analytic {
         }
     }
 
-    fn hold(&self, q: &mut JointVector, redundancy: f64) {
-        if let Some(joint) = self.redundant {
-            q[joint] = redundancy;
-        }
-    }
-
     /// Newton steps onto the true arm; `None` where they do not arrive nearby.
     fn settle(&self, target: &Isometry3<f64>, seed: &JointVector) -> Option<JointVector> {
         if pose_error(&self.chain.tip_pose(seed), target).amax() < RESIDUAL {
@@ -173,7 +167,7 @@ impl Analytic {
             }
             // Damped by the error itself: still quadratic, and steady near a singularity.
             let damping = (DAMPING * error.norm_squared()).max(1e-16);
-            let step = damped_step(&jacobian, &free, &error, damping);
+            let step = damped_step_over(&jacobian, &free, &error, damping);
             for (value, step) in q.iter_mut().zip(&step) {
                 *value += step;
             }
@@ -204,12 +198,11 @@ impl Analytic {
 
 impl InverseKinematics for Analytic {
     fn redundancy_range(&self) -> Option<(f64, f64)> {
-        let joint = self.redundant?;
-        Some(if self.limits[joint].continuous { (-PI, PI) } else { self.margined[joint] })
+        self.redundancy.range
     }
 
     fn redundant_joint(&self) -> Option<usize> {
-        self.redundant
+        self.redundancy.joint
     }
 
     fn solve(&self, target: &Isometry3<f64>, redundancy: f64, out: &mut Solutions) {
@@ -231,7 +224,7 @@ impl InverseKinematics for Analytic {
                 let Some(mut q) = self.settle(target, &q) else { return };
                 settled |= 1 << bits;
                 self.represent(&mut q);
-                let redundancy = self.redundant.map_or(0.0, |j| q[j]);
+                let redundancy = self.redundancy.of(&q);
                 if self.within(&q, 0.0) && !out.iter().any(|s| same(&s.q, &q, SAME)) {
                     let branch = Branch(MARK | bits);
                     // Eight at most, which is less than the capacity.
@@ -263,12 +256,12 @@ impl InverseKinematics for Analytic {
         for &joint in &self.joints {
             q[joint] = unwrap_near(q[joint], near[joint]);
         }
-        let redundancy = self.redundant.map_or(0.0, |j| q[j]);
+        let redundancy = self.redundancy.of(&q);
         Some(Solution { q, branch, redundancy })
     }
 }
 
-/// The axes as a kind takes them: rotations the other way round come in the other order.
+/// The axes as a kind takes them: reversed rotations come in the other order.
 fn ordered(axes: &[JointAxis; MAX_DOF], joints: &[usize; 6], backwards: bool) -> [JointAxis; 6] {
     joints.map(|j| {
         let JointAxis { direction, point } = axes[j];

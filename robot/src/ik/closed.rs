@@ -1,5 +1,5 @@
 //! The closed-form solver of a PR2-shaped arm: a family gives up to four forearms, the wrist gives
-//! two ways to turn for each.
+//! two solutions for each.
 
 use std::f64::consts::PI;
 
@@ -7,10 +7,11 @@ use nalgebra::{Isometry3, Vector3};
 use wide::f64x4;
 
 use super::lanes::{Real, unit};
+use super::redundancy::Redundancy;
 use super::shape::Pr2Shape;
-use super::{Branch, InverseKinematics, Solution, Solutions};
+use super::solution::{Branch, InverseKinematics, Solution, Solutions};
 use crate::JointVector;
-use crate::limits::unwrap_near;
+use crate::joints::unwrap_near;
 
 /// Bit 2 of a branch: sign of the wrist flex (set: negative).
 pub(super) const WRIST_NEGATIVE: u8 = 4;
@@ -55,14 +56,14 @@ pub(crate) struct Forearm<T> {
 #[derive(Debug)]
 pub(crate) struct ClosedForm<F> {
     shape: Pr2Shape,
-    range: (f64, f64),
+    redundancy: Redundancy,
     family: F,
 }
 
 impl<F: Family> ClosedForm<F> {
     pub(super) fn new(shape: Pr2Shape, margined: &[(f64, f64)], family: F) -> Self {
-        let range = if shape.continuous[F::GIVEN] { (-PI, PI) } else { margined[F::GIVEN] };
-        Self { shape, range, family }
+        let redundancy = Redundancy::new(Some(F::GIVEN), margined, |j| shape.continuous[j]);
+        Self { shape, redundancy, family }
     }
 
     fn assemble(&self, arm: [f64; 4], wrist: [f64; 3], given: f64) -> JointVector {
@@ -74,11 +75,11 @@ impl<F: Family> ClosedForm<F> {
 
 impl<F: Family> InverseKinematics for ClosedForm<F> {
     fn redundancy_range(&self) -> Option<(f64, f64)> {
-        Some(self.range)
+        self.redundancy.range
     }
 
     fn redundant_joint(&self) -> Option<usize> {
-        Some(F::GIVEN)
+        self.redundancy.joint
     }
 
     fn solve(&self, target: &Isometry3<f64>, redundancy: f64, out: &mut Solutions) {
@@ -190,7 +191,7 @@ impl<T: Real> Wrist<T> {
         (y * y + z * z).sqrt()
     }
 
-    /// Forearm roll, wrist flex (not negative) and wrist roll. The other way to the same rotation
+    /// Forearm roll, wrist flex (not negative) and wrist roll. The other solution for the same rotation
     /// is half a turn of both rolls and the negative flex.
     #[inline]
     fn angles(&self) -> [T; 3] {

@@ -9,8 +9,9 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Matrix6;
 
-use crate::chain::Chain;
-use crate::{Jacobian, JointVector, MAX_DOF};
+use super::spread::spread;
+use crate::chain::{Chain, Jacobian};
+use crate::{JointVector, MAX_DOF};
 
 /// The fold joints of a chain.
 #[derive(Clone, Debug)]
@@ -163,21 +164,6 @@ pub(super) fn self_motion(chain: &Chain) -> [f64; MAX_DOF] {
 /// The k-th configuration of a sequence that fills −π … π of each joint evenly.
 fn sample(chain: &Chain, k: usize) -> JointVector {
     JointVector::from_fn(|i| if i < chain.dof() { PI * (2.0 * spread(k, i) - 1.0) } else { 0.0 })
-}
-
-/// The k-th number of the van der Corput sequence to the base of a joint (Halton's sequence over
-/// all joints), in (0, 1): even coverage without a random generator.
-pub(super) fn spread(k: usize, joint: usize) -> f64 {
-    const PRIMES: [usize; MAX_DOF] = [2, 3, 5, 7, 11, 13, 17, 19];
-    // The first numbers of the larger bases rise together, so the sequence begins later.
-    let (mut k, base) = (k + 20, PRIMES[joint]);
-    let (mut value, mut weight) = (0.0, 1.0 / base as f64);
-    while k > 0 {
-        value += (k % base) as f64 * weight;
-        k /= base;
-        weight /= base as f64;
-    }
-    value
 }
 
 /// Whether two configurations are one, by whole turns.

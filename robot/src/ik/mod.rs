@@ -2,79 +2,32 @@
 
 mod analytic;
 mod closed;
+mod damped;
 mod folds;
 mod lanes;
 mod numeric;
 mod pan;
+mod redundancy;
 mod roll;
 mod shape;
 mod six;
+mod solution;
+mod spread;
 mod subproblem;
 
-use std::f64::consts::PI;
 use std::sync::Arc;
-
-use nalgebra::Isometry3;
 
 use crate::chain::Chain;
 use crate::limits::JointLimits;
-use crate::{JointVector, MAX_DOF};
 use analytic::Analytic;
 use closed::ClosedForm;
+pub use damped::{damped_step, pose_error};
 pub(crate) use numeric::Numeric;
 use pan::ShoulderPan;
 use roll::UpperArmRoll;
 use shape::Pr2Shape;
-
-/// Names one family of solutions that changes continuously with the target.
-///
-/// Following one branch with [`InverseKinematics::solve_on`] never changes over to another posture:
-/// the branch ends (`None`) where it leaves the reachable space. Where two branches meet (a fold)
-/// a joint path may go over from one to the other, while each branch turns back; and near a
-/// singularity joints move fast however little the target moves. So whoever follows a branch
-/// compares neighbouring solutions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Branch(pub u8);
-
-/// Joint positions that put the tip at a target.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solution {
-    /// Joint positions in chain order.
-    pub q: JointVector,
-    /// The family that the solution belongs to.
-    pub branch: Branch,
-    /// Position of the redundant joint; 0 without redundancy. \[rad\]
-    pub redundancy: f64,
-}
-
-/// All solutions of one call.
-pub type Solutions = heapless::Vec<Solution, 32>;
-
-/// Finds joint positions for a pose of the tip.
-pub trait InverseKinematics: Send + Sync {
-    /// Range of the redundant joint inside the margined limits \[rad\]; ±π for a continuous one;
-    /// `None` for an arm without redundancy.
-    fn redundancy_range(&self) -> Option<(f64, f64)>;
-
-    /// Index in the chain of the joint that is the redundancy.
-    fn redundant_joint(&self) -> Option<usize>;
-
-    /// All solutions for a pose of the tip in the root frame at one value of the redundancy.
-    ///
-    /// `out` is cleared first. Joints with limits take the value nearest to the middle of their
-    /// range, continuous joints one in (−π, π]. The closed form of the PR2's shape does not filter
-    /// by limits; the other solvers give only solutions inside the margined ones.
-    fn solve(&self, target: &Isometry3<f64>, redundancy: f64, out: &mut Solutions);
-
-    /// The solution on one branch, continuous joints unwrapped nearest to `near`.
-    fn solve_on(
-        &self,
-        branch: Branch,
-        target: &Isometry3<f64>,
-        redundancy: f64,
-        near: &JointVector,
-    ) -> Option<Solution>;
-}
+pub use solution::{Branch, InverseKinematics, Solution, Solutions};
+pub(crate) use spread::spread_over;
 
 /// Which joint of a PR2-shaped arm is the redundancy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,15 +81,4 @@ impl Solvers {
     pub(crate) fn is_pr2_shaped(&self) -> bool {
         matches!(self, Self::Pr2 { .. })
     }
-}
-
-/// The k-th joint vector of a sequence that fills the ranges evenly; joints without an end take
-/// −π … π.
-pub(crate) fn spread_over(ranges: &[(f64, f64)], k: usize) -> JointVector {
-    let mut q = [0.0; MAX_DOF];
-    for (i, &(lower, upper)) in ranges.iter().enumerate() {
-        let (lower, upper) = if lower.is_finite() { (lower, upper) } else { (-PI, PI) };
-        q[i] = lower + (upper - lower) * folds::spread(k, i);
-    }
-    JointVector::new(q)
 }

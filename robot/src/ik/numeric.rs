@@ -7,15 +7,18 @@
 //! turn about that axis is free; an arm of fewer finds only poses that it reaches exactly.
 
 use std::collections::VecDeque;
-use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
+use super::damped::{damped_step_over, pose_error};
 use super::folds::{Folds, MOST_FOLDS, same, self_motion};
-use super::{Branch, InverseKinematics, Solution, Solutions, spread_over};
-use crate::chain::Chain;
-use crate::limits::{JointLimits, unwrap_near, wrap};
-use crate::{Jacobian, JointVector, MAX_DOF};
+use super::redundancy::Redundancy;
+use super::solution::{Branch, InverseKinematics, Solution, Solutions};
+use super::spread::spread_over;
+use crate::chain::{Chain, Jacobian};
+use crate::joints::{unwrap_near, wrap};
+use crate::limits::JointLimits;
+use crate::{JointVector, MAX_DOF};
 
 /// The solver.
 ///
@@ -28,7 +31,7 @@ pub(crate) struct Numeric {
     chain: Chain,
     limits: Vec<JointLimits>,
     margined: Vec<(f64, f64)>,
-    redundant: Option<usize>,
+    redundancy: Redundancy,
     folds: Folds,
     seeds: Vec<JointVector>,
 }
@@ -55,7 +58,7 @@ const CONVERGING: f64 = 0.04;
 const CAUGHT: f64 = 0.03;
 /// Farther from the start than this, a followed branch is reached in smaller steps. \[rad\]
 const NEAR: f64 = 0.3;
-/// Finest division of such a way.
+/// Finest division of such a path.
 const DIVISIONS: i32 = 16;
 /// Share of the self-motion that makes the third joint of seven a good redundancy.
 const SHARE: f64 = 0.05;
@@ -71,17 +74,7 @@ impl Numeric {
             chain: chain.clone(),
             limits: limits.to_vec(),
             margined: margined.to_vec(),
-            redundant,
-        }
-    }
-
-    fn hold(&self, q: &mut JointVector, redundancy: f64) -> f64 {
-        match self.redundant {
-            Some(joint) => {
-                q[joint] = redundancy;
-                redundancy
-            }
-            None => 0.0,
+            redundancy: Redundancy::new(redundant, margined, |joint| limits[joint].continuous),
         }
     }
 
@@ -89,7 +82,7 @@ impl Numeric {
     fn starts(&self, target: &Isometry3<f64>, redundancy: f64) -> Vec<JointVector> {
         let distance = |seed: &JointVector| {
             let mut q = *seed;
-            self.hold(&mut q, redundancy);
+            self.redundancy.hold(&mut q, redundancy);
             let tip = self.chain.tip_pose(&q);
             let shift = (tip.translation.vector - target.translation.vector).norm();
             let cosine = tip.rotation.coords.dot(&target.rotation.coords).abs();
@@ -155,11 +148,11 @@ impl Numeric {
         let start = *q;
         let mut free = [false; MAX_DOF];
         free[..self.chain.dof()].fill(true);
-        if let Some(held) = self.redundant {
+        if let Some(held) = self.redundancy.joint {
             free[held] = false;
         }
         for _ in 0..2 {
-            let step = damped_step(jacobian, &free, error, damping);
+            let step = damped_step_over(jacobian, &free, error, damping);
             let most = step.iter().fold(0.0f64, |most, s| most.max(s.abs()));
             let scale = if most > STRIDE { STRIDE / most } else { 1.0 };
             let mut stopped = false;
@@ -181,7 +174,7 @@ impl Numeric {
 
     fn clamp(&self, q: &mut JointVector) {
         for (i, &(lower, upper)) in self.margined.iter().enumerate() {
-            if self.redundant == Some(i) || self.limits[i].continuous {
+            if self.redundancy.joint == Some(i) || self.limits[i].continuous {
                 continue;
             }
             if !self.chain.steps[i].prismatic {
@@ -194,7 +187,7 @@ impl Numeric {
     /// Error from tip to target, linear then angular, and the Jacobian without the held column.
     fn linearise(&self, target: &Isometry3<f64>, q: &JointVector) -> (Vector6<f64>, Jacobian) {
         let (tip, mut jacobian) = self.chain.jacobian(q);
-        if let Some(held) = self.redundant {
+        if let Some(held) = self.redundancy.joint {
             jacobian.column_mut(held).fill(0.0);
         }
         let shift = target.translation.vector - tip.translation.vector;
@@ -222,13 +215,13 @@ impl Numeric {
 
     fn represent(&self, q: &mut JointVector) {
         for (i, limit) in self.limits.iter().enumerate() {
-            if limit.continuous && self.redundant != Some(i) {
+            if limit.continuous && self.redundancy.joint != Some(i) {
                 q[i] = wrap(q[i]);
             }
         }
     }
 
-    /// Follows the straight way from the pose and redundancy of `near`, in `parts` steps.
+    /// Follows the straight path from the pose and redundancy of `near`, in `parts` steps.
     fn follow(
         &self,
         target: &Isometry3<f64>,
@@ -242,7 +235,7 @@ impl Numeric {
         for k in 1..=parts {
             let t = f64::from(k) / f64::from(parts);
             let pose = if k == parts { *target } else { from.try_lerp_slerp(target, t, 1e-9)? };
-            if let Some(held) = self.redundant {
+            if let Some(held) = self.redundancy.joint {
                 q[held] = near[held] + (redundancy - near[held]) * t;
             }
             let before = q;
@@ -257,12 +250,11 @@ impl Numeric {
 
 impl InverseKinematics for Numeric {
     fn redundancy_range(&self) -> Option<(f64, f64)> {
-        let joint = self.redundant?;
-        Some(if self.limits[joint].continuous { (-PI, PI) } else { self.margined[joint] })
+        self.redundancy.range
     }
 
     fn redundant_joint(&self) -> Option<usize> {
-        self.redundant
+        self.redundancy.joint
     }
 
     fn solve(&self, target: &Isometry3<f64>, redundancy: f64, out: &mut Solutions) {
@@ -273,7 +265,7 @@ impl InverseKinematics for Numeric {
         let mut in_vain = 0;
         while in_vain < PATIENCE {
             let Some(mut q) = mirrored.pop_front().or_else(|| fresh.next()) else { break };
-            let redundancy = self.hold(&mut q, redundancy);
+            let redundancy = self.redundancy.hold(&mut q, redundancy);
             in_vain += 1;
             let Some(jacobian) = self.descend(target, out, &mut q) else { continue };
             self.represent(&mut q);
@@ -315,63 +307,13 @@ impl InverseKinematics for Numeric {
             return None;
         }
         for i in (0..self.chain.dof()).filter(|&i| self.limits[i].continuous) {
-            if self.redundant != Some(i) {
+            if self.redundancy.joint != Some(i) {
                 q[i] = unwrap_near(q[i], near[i]);
             }
         }
-        let redundancy = self.hold(&mut q, redundancy);
+        let redundancy = self.redundancy.hold(&mut q, redundancy);
         Some(Solution { q, branch, redundancy })
     }
-}
-
-/// Way from a pose to another, linear \[m\] then angular \[rad\].
-#[inline]
-pub(super) fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
-    let shift = to.translation.vector - from.translation.vector;
-    let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
-    Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
-}
-
-/// Jᵀ (J Jᵀ + λ I)⁻¹ e over the free columns, 0 in the others: the solver's inner loop, by hand
-/// since general matrices took most of its time.
-#[inline]
-pub(super) fn damped_step(
-    jacobian: &Jacobian,
-    free: &[bool; MAX_DOF],
-    error: &Vector6<f64>,
-    damping: f64,
-) -> JointVector {
-    let columns: &[[f64; 6]; MAX_DOF] = &jacobian.data.0;
-    // The lower triangle of J Jᵀ + λ I, then of its Cholesky factor.
-    let mut l = [[0.0; 6]; 6];
-    for (column, _) in columns.iter().zip(free).filter(|(_, free)| **free) {
-        for i in 0..6 {
-            for j in 0..6 {
-                l[i][j] += column[i] * column[j];
-            }
-        }
-    }
-    let mut inverse = [0.0; 6];
-    let mut x = [0.0; 6];
-    for i in 0..6 {
-        for j in 0..i {
-            let known: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
-            l[i][j] = (l[i][j] - known) * inverse[j];
-        }
-        let known: f64 = (0..i).map(|k| l[i][k] * l[i][k]).sum();
-        // Rounding may take away all of a singular direction but the damping.
-        inverse[i] = (l[i][i] + damping - known).max(1e-2 * damping).sqrt().recip();
-        let known: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
-        x[i] = (error[i] - known) * inverse[i];
-    }
-    for i in (0..6).rev() {
-        let known: f64 = (i + 1..6).map(|k| l[k][i] * x[k]).sum();
-        x[i] = (x[i] - known) * inverse[i];
-    }
-    JointVector::from_fn(|c| match free[c] {
-        true => (0..6).map(|i| columns[c][i] * x[i]).sum(),
-        false => 0.0,
-    })
 }
 
 /// Orders solutions by branch signs and joint values, and counts those with the same signs.

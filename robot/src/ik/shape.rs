@@ -10,7 +10,8 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::chain::{Chain, JointAxis};
-use crate::limits::{JointLimits, unwrap_near, wrap};
+use crate::joints::{unwrap_near, wrap};
+use crate::limits::JointLimits;
 use crate::{JointVector, MAX_DOF};
 
 /// An arm's measures and how its joints map to the canonical ones.

@@ -1,4 +1,4 @@
-//! Six rotations in a row whose angles have a closed form: all ways to bring about a motion.
+//! Six rotations in a row whose angles have a closed form: all solutions for a motion.
 //!
 //! Own derivation with the subproblems of [`super::subproblem`]; the kinds are among those of
 //! Pieper (1968) and of Elias and Wen, *IK-Geo* (2022). The axes stand in one frame, where they are
@@ -86,7 +86,7 @@ impl Kind {
         })
     }
 
-    /// Calls `found` with each way to bring about `motion`, or that on the one branch asked for:
+    /// Calls `found` with each solution for `motion`, or that on the one branch asked for:
     /// its branch, three bits, and its angles \[rad\]. Joints that are not determined take their
     /// value of `free`.
     pub(super) fn angles(self, question: &Question<'_>, found: impl FnMut(u8, [f64; 6])) {

@@ -4,11 +4,11 @@ use std::collections::{HashMap, HashSet, VecDeque};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 
-use super::xml::JointFacts;
-use super::{
+use super::error::UrdfError;
+use super::model::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, Model, SafetyController,
-    UrdfError,
 };
+use super::xml::JointFacts;
 
 /// Checks names, numbers and the tree.
 pub(super) fn build(
