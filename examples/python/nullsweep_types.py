@@ -206,7 +206,6 @@ class Fault(enum.IntEnum):
     NOT_FINITE = 9
     LOW_RATE = 10
     JOINT_COUNT = 11
-    OPERATOR = 12
     HELD_JOINT = 13
 
 
@@ -231,7 +230,6 @@ _TEXTS[Fault] = {
     Fault.NOT_FINITE: "a joint value is not finite",
     Fault.LOW_RATE: "the loop's mean rate is too low",
     Fault.JOINT_COUNT: "the joint state has another number of joints",
-    Fault.OPERATOR: "stopped by the operator",
     Fault.HELD_JOINT: "a held joint has moved",
 }
 
@@ -300,7 +298,6 @@ class Reason(enum.IntEnum):
     STOPPED = 15
     FAULT = 16
     SHUTDOWN = 17
-    RESET = 18
 
 
 _TEXTS[EventKind] = {
@@ -330,7 +327,6 @@ _TEXTS[Reason] = {
     Reason.STOPPED: "stopped by command",
     Reason.FAULT: "ended by a fault",
     Reason.SHUTDOWN: "the executor shut down",
-    Reason.RESET: "dropped by a reset",
 }
 
 

@@ -29,7 +29,7 @@ wire_enum! {
 wire_enum! {
     /// How a command was taken.
     Verdict {
-        /// Done, or under way.
+        /// Done, or begun.
         Accepted = 0 => "accepted",
         /// Not possible in this mode.
         WrongMode = 1 => "not possible in this mode",

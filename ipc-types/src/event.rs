@@ -26,7 +26,8 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// Why a plan was rejected or aborted.
+    /// Why a plan was rejected or aborted. 18 is reserved: it was once given to a reason that
+    /// nothing ever sent.
     Reason {
         /// No reason is needed.
         None = 0 => "none",
@@ -64,8 +65,6 @@ wire_enum! {
         Fault = 16 => "ended by a fault",
         /// The executor shut down.
         Shutdown = 17 => "the executor shut down",
-        /// The operator reset the executor while it waited.
-        Reset = 18 => "dropped by a reset",
     }
 }
 

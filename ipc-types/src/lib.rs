@@ -48,7 +48,7 @@ pub const MAX_KNOTS: usize = 16_384;
 /// One value for each joint of the arm; entries past the joint count are zero. \[rad\] or \[m\]
 pub type JointArray = [f64; MAX_JOINTS];
 
-/// Makes a fieldless enum that crosses the wire as a `u32`, with a checked way back.
+/// Makes a fieldless enum that crosses the wire as a `u32`, with a checked conversion back.
 macro_rules! wire_enum {
     ($(#[$meta:meta])* $name:ident { $($(#[$vmeta:meta])* $variant:ident = $value:literal => $text:literal,)+ }) => {
         $(#[$meta])*

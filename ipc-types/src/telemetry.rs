@@ -25,7 +25,8 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// Why the executor is in [`Mode::Fault`], or why it stopped.
+    /// Why the executor is in [`Mode::Fault`], or why it stopped. 12 is reserved: it was once given
+    /// to a fault that nothing ever told.
     Fault {
         /// None.
         None = 0 => "none",
@@ -51,8 +52,6 @@ wire_enum! {
         LowRate = 10 => "the loop's mean rate is too low",
         /// A state has another number of joints than the arm.
         JointCount = 11 => "the joint state has another number of joints",
-        /// An operator asked for a stop.
-        Operator = 12 => "stopped by the operator",
         /// A joint that the running plan takes as fixed has moved: the arm was stopped on its path.
         HeldJoint = 13 => "a held joint has moved",
     }

@@ -9,7 +9,8 @@ use iceoryx2::port::server::Server;
 use iceoryx2::prelude::{BackpressureStrategy, PortFactory as _, ipc};
 use iceoryx2::service::port_factory::request_response::PortFactory;
 
-use super::{Ipc, IpcError, PortError};
+use super::error::{IpcError, PortError};
+use super::node::Ipc;
 use crate::service::{COMMAND, COMMAND_CLIENTS, MAX_NODES};
 use crate::{Command, CommandKind, Response};
 

@@ -37,7 +37,7 @@ pub enum IpcError {
     Taken {
         /// Which service.
         what: String,
-        /// iceoryx2's own word.
+        /// What iceoryx2 says.
         detail: String,
     },
     /// The other side has other types, QoS or another version of iceoryx2.
@@ -45,7 +45,7 @@ pub enum IpcError {
     Incompatible {
         /// Which service.
         what: String,
-        /// iceoryx2's own word.
+        /// What iceoryx2 says.
         detail: String,
     },
     /// Files or segments belong to another user.
@@ -59,7 +59,7 @@ pub enum IpcError {
         what: String,
         /// The root path, `None` for the default.
         root: Option<PathBuf>,
-        /// iceoryx2's own word.
+        /// What iceoryx2 says.
         detail: String,
     },
     /// Less shared memory is free than is needed.
@@ -81,7 +81,7 @@ pub enum IpcError {
         what: String,
         /// How often it was tried.
         attempts: u32,
-        /// iceoryx2's own word.
+        /// What iceoryx2 says.
         detail: String,
     },
     /// The robot's name cannot be part of a service's name.
@@ -130,7 +130,7 @@ pub enum IpcError {
     Other {
         /// Which service.
         what: String,
-        /// iceoryx2's own word.
+        /// What iceoryx2 says.
         detail: String,
     },
 }

@@ -8,7 +8,9 @@ use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, PortFactory as
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::{Ipc, IpcError, PortError, need_shared_memory, now_ns};
+use super::clock::now_ns;
+use super::error::{IpcError, PortError};
+use super::node::{Ipc, need_shared_memory};
 use crate::service::{MAX_NODES, PLAN};
 use crate::{Knot, MAX_KNOTS, PlanHeader, PlanId, PlanMessage, checksum};
 

@@ -13,7 +13,8 @@ use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
-use super::{Ipc, IpcError, PortError};
+use super::error::{IpcError, PortError};
+use super::node::Ipc;
 use crate::service::{MAX_NODES, Qos};
 use crate::{JointStates, PlanEvent, Setpoint, Telemetry};
 
