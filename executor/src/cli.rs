@@ -18,6 +18,7 @@ use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
+use crate::admit::Rules;
 use crate::executor::{Config, Summary, quantile_ns, run};
 use crate::guard::Guard;
 use crate::record::replay;
@@ -39,7 +40,7 @@ enum Action {
     Run(Box<RunArgs>),
     /// Send a command to a running executor.
     Ctl(CtlArgs),
-    /// Replay a flight recording and compare every setpoint, to the bit.
+    /// Replay a flight recording and compare every setpoint bit for bit.
     Replay {
         /// A file that `run --record` wrote.
         file: PathBuf,
@@ -90,11 +91,11 @@ struct RunArgs {
     #[arg(long, default_value_t = 0.75)]
     min_rate: f64,
     /// How far a plan's first knot may be from where the arm holds. [rad]
-    #[arg(long, default_value_t = 0.02)]
+    #[arg(long, default_value_t = Guard::START_TOLERANCE)]
     start_tolerance: f64,
     /// How far a held joint (torso, other arm) may be from where a plan takes it; twice that far
     /// it may move while the plan runs. [rad or m]
-    #[arg(long, default_value_t = 0.01)]
+    #[arg(long, default_value_t = Rules::HELD_TOLERANCE)]
     held_tolerance: f64,
     /// Following error that is allowed at stand-still. [rad]
     #[arg(long, default_value_t = 0.1)]
@@ -267,7 +268,7 @@ fn replay_command(file: &Path) -> anyhow::Result<ExitCode> {
         println!("cycle {cycle}: {event}");
     }
     println!(
-        "{} cycles, {} setpoints, all the same to the bit; {} bytes of a torn record left out",
+        "{} cycles, {} setpoints, all bit-identical; {} bytes of a torn record left out",
         replayed.cycles, replayed.setpoints, replayed.torn
     );
     Ok(ExitCode::SUCCESS)

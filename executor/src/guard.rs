@@ -1,9 +1,7 @@
 //! The limits that the executor enforces: from its own URDF and its own parameters, never from
 //! the plan that it guards.
 
-use core::f64::consts::TAU;
-
-use nullsweep_robot::{JointLimits, JointVector, MAX_DOF};
+use nullsweep_robot::{Continuous, JointLimits, JointVector, MAX_DOF};
 
 /// What one joint may do, as the robot crate reads it from the URDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,8 +11,8 @@ pub struct JointGuard {
 }
 
 impl JointGuard {
-    /// The soft limits at a speed: moved in by the way that the PR2's position gain needs to
-    /// brake from it. The planner asks the same function.
+    /// The soft limits at a speed: moved in by the distance that the PR2's position gain
+    /// needs to brake from it. The planner asks the same function.
     #[must_use]
     pub fn limits_at(&self, speed: f64) -> (f64, f64) {
         self.limits.braking(speed)
@@ -24,19 +22,6 @@ impl JointGuard {
     #[must_use]
     pub fn velocity(&self) -> f64 {
         self.limits.velocity
-    }
-
-    /// `to - from`, by the shorter way around where the joint is continuous.
-    #[must_use]
-    pub fn difference(&self, from: f64, to: f64) -> f64 {
-        to - from + self.turns(from, to)
-    }
-
-    /// The whole turns to add to `value` so that it comes nearest to `reference`: 0 unless the
-    /// joint is continuous. \[rad\]
-    #[must_use]
-    pub fn turns(&self, reference: f64, value: f64) -> f64 {
-        if self.limits.continuous { TAU * ((reference - value) / TAU).round() } else { 0.0 }
     }
 }
 
@@ -77,6 +62,9 @@ pub struct Guard {
 }
 
 impl Guard {
+    /// Default of [`Self::start_tolerance`]. \[rad\]
+    pub const START_TOLERANCE: f64 = 0.02;
+
     /// Guards these joints with the default parameters at a 1 kHz cycle. At most
     /// [`MAX_DOF`] joints are used.
     #[must_use]
@@ -100,7 +88,7 @@ impl Guard {
             period_ns: 1_000_000,
             stop_acceleration: 10.0,
             connector_acceleration: 2.0,
-            start_tolerance: 0.02,
+            start_tolerance: Self::START_TOLERANCE,
             join_tolerance: 1e-9,
             stale_ns: 20_000_000,
             lost_ns: 100_000_000,
@@ -124,7 +112,13 @@ impl Guard {
         &self.joints[..self.dof.min(MAX_DOF)]
     }
 
-    /// The acceleration of a joint on the way from where the arm holds to a plan's first knot.
+    /// Which joints turn without end.
+    #[must_use]
+    pub fn continuous(&self) -> Continuous {
+        Continuous::new(self.joints.map(|joint| joint.limits.continuous))
+    }
+
+    /// The acceleration of a joint from where the arm holds to a plan's first knot.
     /// \[rad/s²\] or \[m/s²\]
     #[must_use]
     pub fn connector_acceleration(&self, joint: usize) -> f64 {
@@ -162,8 +156,8 @@ impl Guard {
         tolerance: f64,
     ) -> Option<(usize, f64)> {
         let mut worst: Option<(usize, f64)> = None;
-        for (j, guard) in self.used().iter().enumerate() {
-            let apart = guard.difference(from[j], to[j]).abs();
+        let displacement = self.continuous().displacement(from, to);
+        for (j, &apart) in displacement.iter().enumerate().take(self.used().len()) {
             if apart.is_nan() {
                 return Some((j, apart));
             }
@@ -188,11 +182,17 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn differences_take_the_short_way_on_continuous_joints_only() {
+    fn whole_turns_are_no_distance_on_continuous_joints_only() {
         let guard = pr2();
-        assert!((guard.joints[4].difference(3.0, -3.0) - 0.283_185_307).abs() < 1e-8);
-        assert!((guard.joints[4].difference(-9.0, -9.0 + 10.0 * TAU)).abs() < 1e-12);
-        assert_eq!(guard.joints[0].difference(3.0, -3.0), -6.0);
+        let apart = |joint: usize, from: f64, to: f64| {
+            let mut ends = [JointVector::ZERO; 2];
+            (ends[0][joint], ends[1][joint]) = (from, to);
+            guard.farthest(&ends[0], &ends[1], 1e-9)
+        };
+        let (joint, by) = apart(4, 3.0, -3.0).unwrap();
+        assert!(joint == 4 && (by - 0.283_185_307).abs() < 1e-8, "{joint} {by}");
+        assert_eq!(apart(4, -9.0, -9.0 + 10.0 * core::f64::consts::TAU), None);
+        assert_eq!(apart(0, 3.0, -3.0), Some((0, 6.0)));
         let mut to = JointVector::ZERO;
         to[5] = f64::NAN;
         assert_eq!(guard.farthest(&JointVector::ZERO, &to, 0.1).map(|(j, _)| j), Some(5));

@@ -1,7 +1,7 @@
 //! Between two knots: straight joint lines (bang-bang velocity) or cubic Hermite curves.
 //!
 //! Everything is evaluated in closed form from absolute plan time, so nothing drifts, and both
-//! ends of a segment are hit to the bit.
+//! ends of a segment are hit bit for bit.
 
 use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::Interpolation;

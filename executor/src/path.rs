@@ -36,7 +36,7 @@ impl Path {
     #[must_use]
     pub fn start(plan: Arc<ValidPlan>, from: &JointVector, rate: f64, guard: &Guard) -> Self {
         let shift = shift(&plan, from, guard);
-        let first = plan.knots().first().map_or(*from, |k| shifted(&k.q, &shift));
+        let first = plan.knots().first().map_or(*from, |k| k.q + shift);
         let connector = Connector::new(from, &first, guard);
         let progress = Progress { time: -connector.duration, rate, segment: 0 };
         Self { plan, shift, connector, progress }
@@ -101,7 +101,7 @@ impl Path {
     }
 
     /// Where a stop that begins with the next cycle ends; `None` where no end is in sight. The
-    /// same arithmetic as [`Self::advance`], so the arm stops there to the bit.
+    /// same arithmetic as [`Self::advance`], so the arm stops there bit for bit.
     #[must_use]
     pub fn predict_stop(&self, guard: &Guard) -> Option<JointVector> {
         let mut progress = self.progress;
@@ -125,14 +125,14 @@ impl Path {
     #[must_use]
     pub fn knot_at(&self, knot: usize) -> Option<PlanKnot> {
         let mut knot = *self.plan.knots().get(knot)?;
-        knot.q = shifted(&knot.q, &self.shift);
+        knot.q = knot.q + self.shift;
         Some(knot)
     }
 
     /// The last knot's place in this path.
     #[must_use]
     pub fn end(&self) -> JointVector {
-        self.plan.knots().last().map_or(self.connector.to, |k| shifted(&k.q, &self.shift))
+        self.plan.knots().last().map_or(self.connector.to, |k| k.q + self.shift)
     }
 
     fn next(&self, from: Progress, target: f64, guard: &Guard) -> Progress {
@@ -176,7 +176,7 @@ impl Path {
             return Sample { q: self.connector.to, v: JointVector::ZERO };
         };
         let mut s = sample(a, b, self.plan.interpolation(), at.time);
-        s.q = shifted(&s.q, &self.shift);
+        s.q = s.q + self.shift;
         s.v = JointVector::new(s.v.map(|v| v * at.rate));
         s
     }
@@ -192,7 +192,7 @@ struct Connector {
     duration: f64,
     /// Time of speeding up, and of slowing down. \[s\]
     rise: f64,
-    /// Acceleration of the share 0…1 of the way. \[1/s²\]
+    /// Acceleration of the share 0…1 of the distance. \[1/s²\]
     acceleration: f64,
     /// See [`PlanKnot::ramp`].
     ramp: f64,
@@ -204,22 +204,22 @@ impl Connector {
     }
 
     fn new(from: &JointVector, to: &JointVector, guard: &Guard) -> Self {
-        let mut way = 0.0f64;
+        let mut farthest = 0.0f64;
         let (mut speed, mut acceleration) = (f64::INFINITY, f64::INFINITY);
         for (j, bound) in guard.used().iter().enumerate() {
             let d = (to[j] - from[j]).abs();
-            way = way.max(d);
+            farthest = farthest.max(d);
             if d > 0.0 {
                 speed = speed.min(bound.velocity() / d);
                 acceleration = acceleration.min(guard.connector_acceleration(j) / d);
             }
         }
-        if !(way > 0.0) || !(speed > 0.0) || !(acceleration > 0.0) {
+        if !(farthest > 0.0) || !(speed > 0.0) || !(acceleration > 0.0) {
             return Self { from: *from, ..Self::none(to) };
         }
         let rise = (speed / acceleration).min(acceleration.sqrt().recip());
         let top = acceleration * rise;
-        // The way is 1: a triangle covers top · rise, the rest is at top speed.
+        // The distance is 1: a triangle covers top · rise, the rest is at top speed.
         let cruise = (1.0 - top * rise).max(0.0) / top;
         Self {
             from: *from,
@@ -227,7 +227,7 @@ impl Connector {
             duration: ((2.0 * rise + cruise) * 1e9).ceil(),
             rise,
             acceleration,
-            ramp: (guard.stop_acceleration / (top * way)).clamp(1.0, 50.0),
+            ramp: (guard.stop_acceleration / (top * farthest)).clamp(1.0, 50.0),
         }
     }
 
@@ -253,22 +253,10 @@ impl Connector {
     }
 }
 
+/// Whole turns of continuous joints that bring a plan's first knot nearest to a reference. \[rad\]
 fn shift(plan: &ValidPlan, reference: &JointVector, guard: &Guard) -> JointVector {
-    let mut shift = [0.0; MAX_DOF];
-    if let Some(first) = plan.knots().first() {
-        for (j, bound) in guard.used().iter().enumerate() {
-            shift[j] = bound.turns(reference[j], first.q[j]);
-        }
-    }
-    JointVector::new(shift)
-}
-
-fn shifted(q: &JointVector, shift: &JointVector) -> JointVector {
-    let mut sum = *q;
-    for j in 0..MAX_DOF {
-        sum[j] += shift[j];
-    }
-    sum
+    let first = plan.knots().first();
+    first.map_or(JointVector::ZERO, |k| guard.continuous().turns_to(&k.q, reference))
 }
 
 #[cfg(test)]
@@ -304,7 +292,7 @@ mod tests {
         /// make; further away it keeps to the line and to every bound.
         #[test]
         fn a_connector_is_the_best_straight_motion(
-            way in prop::array::uniform7(-1.0..1.0f64),
+            apart in prop::array::uniform7(-1.0..1.0f64),
             far in any::<bool>(),
             weak in 0..DOF,
             share in 0.1..1.0f64,
@@ -315,7 +303,7 @@ mod tests {
             let reach = if far { 1.0 } else { guard.start_tolerance };
             let mut to = from;
             for j in 0..DOF {
-                to[j] += reach * way[j];
+                to[j] += reach * apart[j];
             }
             let connector = Connector::new(&from, &to, &guard);
             let seconds = connector.duration * 1e-9;

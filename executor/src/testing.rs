@@ -26,7 +26,7 @@ pub(crate) fn rules(guard: &Guard) -> Rules {
         guard: *guard,
         fingerprint: FINGERPRINT,
         held_continuous: vec![false, true],
-        held_tolerance: 0.01,
+        held_tolerance: Rules::HELD_TOLERANCE,
         since_ns: 100,
     }
 }

@@ -196,6 +196,11 @@ pub struct Rules {
     pub since_ns: u64,
 }
 
+impl Rules {
+    /// Default of [`Self::held_tolerance`]. \[rad\] or \[m\]
+    pub const HELD_TOLERANCE: f64 = 0.01;
+}
+
 /// Checks a private copy of a plan. `held` is where the held joints stand now, `None` while no
 /// state has come.
 ///

@@ -1,4 +1,4 @@
-//! Each way in which a plan can be wrong, and the reason that it is rejected with.
+//! Everything that can be wrong with a plan, and the reason that it is rejected with.
 
 use nullsweep_ipc_types::{Interpolation, JoinRule, Knot, MAX_KNOTS, PlanHeader, PlanId, Reason};
 use proptest::prelude::*;
@@ -77,7 +77,7 @@ const SEALED: &[Case] = &[
         Some(2),
         Some(4),
     ),
-    // Both knots are inside, but the curve swings out on its way.
+    // Both knots are inside, but the curve swings out between them.
     (
         "cubic swing",
         |h, k| {

@@ -3,8 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::{Fault, Mode};
 
-use super::supervise::Watch;
-use super::{Measured, REMEMBERED, State};
+use super::exchange::Measured;
+use super::state::{REMEMBERED, State, small};
+use super::watch::Watch;
 use crate::JointVector;
 
 /// A [`State`] without plans.
@@ -53,7 +54,7 @@ impl From<&Measured> for MeasuredRecord {
             stamp_ns: m.stamp_ns,
             setpoint_sequence: m.setpoint_sequence,
             q: m.q,
-            joint_count: super::small(m.joint_count),
+            joint_count: small(m.joint_count),
             status: m.status,
         }
     }

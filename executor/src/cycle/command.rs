@@ -2,49 +2,9 @@
 
 use nullsweep_ipc_types::{EventKind, Fault, Mode, Reason, Verdict};
 
-use super::{Output, Snapshot, State, StopCause};
+use super::exchange::{Ask, Order, Output, Reply};
+use super::state::{State, StopCause};
 use crate::guard::Guard;
-
-/// An order and a number to know its answer by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ask {
-    /// Comes back in the reply.
-    pub ticket: u64,
-    /// What is asked.
-    pub order: Order,
-}
-
-/// What is asked.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
-    /// Only answer.
-    Status,
-    /// Slow down to a stand-still on the path and keep the plan.
-    Pause,
-    /// Go on; after a halt or a disable, allow motion again.
-    Resume,
-    /// Slow down on the path, drop the plan, hold (category 2).
-    Stop,
-    /// As `Stop`, then ask the endpoint to disable its motors (category 1).
-    StopAndDisable,
-    /// Ramp the speed scale to this, 0…1.
-    Speed(f64),
-    /// Clear a latched fault.
-    Reset,
-    /// As `StopAndDisable`, and take no more plans.
-    Shutdown,
-}
-
-/// How an order was taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reply {
-    /// The order's.
-    pub ticket: u64,
-    /// How it was taken.
-    pub verdict: Verdict,
-    /// The loop right after.
-    pub snapshot: Snapshot,
-}
 
 impl State {
     /// Takes an order and answers it.

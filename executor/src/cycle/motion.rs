@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nullsweep_ipc_types::{EventKind, Fault, Mode, Reason};
 
-use super::{Output, State, StopCause, Turn};
+use super::exchange::Output;
+use super::state::{State, StopCause, Turn};
 use crate::JointVector;
 use crate::admit::{Rejection, ValidPlan};
 use crate::guard::Guard;
@@ -140,7 +141,7 @@ impl State {
         }
     }
 
-    /// The last look: finite, no step beyond v·T, no way out of the soft limits.
+    /// The last look: finite, no step beyond v·T, nothing that leaves the soft limits.
     fn allows(&self, sample: &Sample, guard: &Guard) -> Result<(), Fault> {
         for (j, bound) in guard.used().iter().enumerate() {
             let (from, to) = (self.q[j], sample.q[j]);

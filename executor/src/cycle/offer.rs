@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 use nullsweep_ipc_types::{EventKind, Fault, Interpolation, Mode, PlanId, Reason};
 
-use super::{Output, State, StopCause, Turn, Waiting};
+use super::exchange::Output;
+use super::state::{State, StopCause, Turn, Waiting};
 use crate::admit::{Join, Rejection, ValidPlan};
 use crate::guard::Guard;
 use crate::path::Path;

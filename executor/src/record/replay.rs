@@ -47,7 +47,7 @@ pub enum ReplayError {
     },
 }
 
-/// What a replay found: every setpoint was the same to the bit.
+/// What a replay found: every setpoint was bit-identical.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Replayed {
     /// Cycles that were replayed.
@@ -68,7 +68,7 @@ impl Replayed {
     }
 }
 
-/// Replays a recording and compares every setpoint, to the bit.
+/// Replays a recording and compares every setpoint bit for bit.
 ///
 /// # Errors
 /// When it is no recording, or the first setpoint that differs.

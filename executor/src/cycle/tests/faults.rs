@@ -227,3 +227,44 @@ fn what_follows_nothing_needs_no_brake() {
         assert_eq!(sim.last, Some(at));
     }
 }
+
+/// The last look before a setpoint goes out. Admission lets no such plan through, so the bound is
+/// tightened beneath a plan that runs: nothing of the setpoint that breaks it is commanded, the
+/// arm stands where it was, and every plan ends.
+#[test]
+fn a_setpoint_that_would_break_a_bound_is_not_commanded() {
+    type Tightens = fn(&mut Sim);
+    let cases: [(&str, Tightens, Fault); 3] = [
+        ("slower", |s| s.guard.joints[0].limits.velocity = 0.5, Fault::Step),
+        ("lower", |s| s.guard.joints[0].limits.upper = HOME[0] + 0.2, Fault::SoftLimit),
+        ("a weak brake", |s| s.guard.joints[0].limits.k_position = Some(0.5), Fault::SoftLimit),
+    ];
+    for (name, tighten, fault) in cases {
+        let mut sim = in_mode(Mode::Executing);
+        let points = line(moved(HOME, 0, 0.4));
+        let waits = plan(&sim.guard, 2, JoinRule::AfterCurrent, &points);
+        only(&sim.offer(waits), Accepted);
+        tighten(&mut sim);
+        let upper = sim.guard.joints[0].limits.upper;
+        for _ in 0..400 {
+            let before = sim.last;
+            sim.run(1);
+            if sim.mode() == Mode::Fault {
+                assert_eq!(sim.last, before, "{name}: the last good one stands");
+                break;
+            }
+        }
+        assert_eq!((sim.mode(), sim.state.snapshot().fault), (Mode::Fault, fault), "{name}");
+        assert_eq!(sim.last_v, JointVector::ZERO, "{name}");
+        let stood = sim.last.unwrap();
+        assert!(stood[0] <= upper, "{name}");
+        assert_eq!(sim.story(1), [Accepted, Started, Aborted], "{name}");
+        assert_eq!(sim.story(2), [Accepted, Aborted], "{name}");
+        assert_eq!(sim.events.last().unwrap().why.reason, Reason::Fault, "{name}");
+        sim.run(100);
+        assert_eq!((sim.mode(), sim.last), (Mode::Fault, Some(stood)), "{name}: it is latched");
+        assert_eq!(sim.order(Order::Reset).verdict, Verdict::Accepted, "{name}");
+        sim.run(5);
+        assert_eq!(sim.mode(), Mode::Hold, "{name}");
+    }
+}

@@ -20,7 +20,7 @@ fn runs_a_plan_to_its_exact_end() {
         sim.run(1);
         assert_eq!(sim.story(1), [Accepted, Started, Finished], "{kind}");
         assert_eq!(sim.mode(), Mode::Hold);
-        assert_eq!(sim.last, Some(points[8].1), "the last knot is hit to the bit");
+        assert_eq!(sim.last, Some(points[8].1), "the last knot is hit bit for bit");
         sim.run(50);
         assert_eq!(sim.last, Some(points[8].1));
         assert_eq!(sim.last_v, JointVector::ZERO);
