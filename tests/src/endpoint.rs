@@ -38,7 +38,7 @@ pub struct Behaviour {
 
 /// What the endpoint itself did, beside the judge's verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Deeds {
+pub struct Counters {
     /// How often it stopped by itself because setpoints ceased.
     pub timeouts: u64,
     /// Setpoints that it did not follow, because after a stop they were too far from the arm.
@@ -70,7 +70,7 @@ pub struct Endpoint {
     /// What the last state said, the last finite one.
     reported: JointVector,
     sequence: u64,
-    deeds: Deeds,
+    counters: Counters,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -112,7 +112,7 @@ impl Endpoint {
             jumped: false,
             reported: initial,
             sequence: 0,
-            deeds: Deeds::default(),
+            counters: Counters::default(),
         })
     }
 
@@ -124,8 +124,8 @@ impl Endpoint {
 
     /// What the endpoint did so far.
     #[must_use]
-    pub fn deeds(&self) -> Deeds {
-        self.deeds
+    pub fn counters(&self) -> Counters {
+        self.counters
     }
 
     /// Where the arm is measured, whatever a fault makes it report. \[rad\] or \[m\]
@@ -216,7 +216,7 @@ impl Endpoint {
         state.held_count = self.held.len() as u32;
         state.joint_count = joint_count;
         state.status = bits;
-        self.deeds.states += 1;
+        self.counters.states += 1;
         Some(state)
     }
 
@@ -236,7 +236,7 @@ impl Endpoint {
         self.plant.hold();
         self.timed_out = true;
         self.following = false;
-        self.deeds.timeouts += 1;
+        self.counters.timeouts += 1;
     }
 
     fn follow(&mut self, setpoint: &Setpoint, now_ns: u64) {
@@ -244,12 +244,12 @@ impl Endpoint {
             && setpoint.positions[..self.dof].iter().all(|q| q.is_finite())
             && setpoint.velocities[..self.dof].iter().all(|v| v.is_finite());
         if !sound {
-            self.deeds.refused += 1;
+            self.counters.refused += 1;
             return;
         }
         self.deadline_ns = Some(setpoint.deadline_ns);
         if setpoint.disable != 0 && !self.disabled {
-            self.deeds.disabled += 1;
+            self.counters.disabled += 1;
             self.plant.release();
         }
         self.disabled = setpoint.disable != 0;
@@ -257,7 +257,7 @@ impl Endpoint {
             && !self.is_active(FaultKind::Halt, now_ns)
             && !self.is_active(FaultKind::Deaf, now_ns);
         if able && !self.following && !self.is_near(setpoint) {
-            self.deeds.refused += 1;
+            self.counters.refused += 1;
             self.timed_out = true;
             return;
         }
@@ -339,16 +339,16 @@ mod tests {
         assert_eq!(state.status & status::SETPOINT_TIMEOUT, status::SETPOINT_TIMEOUT);
         rig.endpoint.receive(&[], 500 * MS);
         assert!((rig.endpoint.positions()[0] - (rig.home[0] + rig.moved)).abs() < 5e-3);
-        assert_eq!(rig.endpoint.deeds().timeouts, 1);
+        assert_eq!(rig.endpoint.counters().timeouts, 1);
 
         // It follows again only what begins where the arm is.
         rig.moved -= 0.5;
         rig.send(501 * MS);
-        assert_eq!(rig.endpoint.deeds().refused, 1);
+        assert_eq!(rig.endpoint.counters().refused, 1);
         assert!(rig.endpoint.is_timed_out());
         rig.moved += 0.5;
         rig.send(502 * MS);
-        assert_eq!(rig.endpoint.deeds().refused, 1);
+        assert_eq!(rig.endpoint.counters().refused, 1);
         assert!(!rig.endpoint.is_timed_out());
     }
 
@@ -358,7 +358,7 @@ mod tests {
         rig.send(0);
         let late: Vec<_> = (1..60).map(|k| rig.setpoint(k * MS)).collect();
         rig.endpoint.receive(&late, 60 * MS);
-        assert_eq!(rig.endpoint.deeds().timeouts, 0);
+        assert_eq!(rig.endpoint.counters().timeouts, 0);
         assert!(rig.endpoint.judge().verdict().is_clean());
     }
 
@@ -391,7 +391,7 @@ mod tests {
         assert_eq!(status_of("link@5ms"), status::CALIBRATED);
         let (_, rig) = state_with("deaf@5ms");
         assert!(rig.endpoint.positions()[0] > rig.home[0] - 7e-3);
-        assert_eq!(state_with("drop@0s").1.endpoint.deeds().states, 11);
+        assert_eq!(state_with("drop@0s").1.endpoint.counters().states, 11);
     }
 
     #[test]
@@ -408,6 +408,6 @@ mod tests {
         assert!((rig.endpoint.positions()[0] - at).abs() < 2e-3);
         let state = rig.endpoint.measure(65 * MS).expect("sent");
         assert_eq!(state.status & status::HALTED, status::HALTED);
-        assert_eq!(rig.endpoint.deeds().disabled, 1);
+        assert_eq!(rig.endpoint.counters().disabled, 1);
     }
 }

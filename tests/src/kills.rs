@@ -189,7 +189,7 @@ impl<'a> Lab<'a> {
                 }
             }
         }
-        bail!("the way home was broken off {TRIES} times")
+        bail!("the return home was broken off {TRIES} times")
     }
 
     /// Waits until the arm is held, and resets a latched fault until its cause is gone.

@@ -44,7 +44,7 @@ impl Loopback {
             guard,
             fingerprint: arm.fingerprint(),
             held_continuous: vec![false; arm.held_joints().len()],
-            held_tolerance: 0.01,
+            held_tolerance: Rules::HELD_TOLERANCE,
             since_ns: start_ns,
         };
         Ok(Self {

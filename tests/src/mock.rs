@@ -22,7 +22,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::arm_args::{ArmArgs, initial_posture};
 use crate::clock::Grid;
-use crate::endpoint::{Behaviour, Deeds, Endpoint, Fidelity};
+use crate::endpoint::{Behaviour, Counters, Endpoint, Fidelity};
 use crate::fault::FaultAt;
 use crate::judge::{Rules, Verdict};
 use crate::measured::{Swept, swept};
@@ -88,7 +88,7 @@ pub struct Outcome {
     /// The judge's findings.
     pub verdict: Verdict,
     /// What the endpoint itself did.
-    pub endpoint: Deeds,
+    pub endpoint: Counters,
     /// Cycles of the mock's own loop that began more than one period late.
     pub own_late_cycles: u64,
     /// What the measured positions have swept, where a plan was given.
@@ -178,7 +178,7 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
         seconds: (now - start_ns) as f64 * 1e-9,
         violations: endpoint.judge().verdict().total(),
         verdict: endpoint.judge().verdict().clone(),
-        endpoint: endpoint.deeds(),
+        endpoint: endpoint.counters(),
         own_late_cycles,
         swept: plan.as_ref().map(|plan| swept(plan, &arm, recorder.postures())),
         tracking: recorder.tracking(),

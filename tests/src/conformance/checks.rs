@@ -139,7 +139,7 @@ impl<H: Hardware, C: Clock> Rig<H, C> {
 
     /// Lets setpoints cease until the endpoint says that it stopped by itself.
     fn cease(&mut self, terms: &Terms) -> Result<(), Broken> {
-        // One period until the last setpoint's deadline, and two on the way.
+        // One period until the last setpoint's deadline, and two in transit.
         for _ in 0..ms(terms.grace_ms) + 3 {
             self.cycle(None)?;
             if self.has(status::SETPOINT_TIMEOUT) {
@@ -245,11 +245,11 @@ fn follow<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<(
         let (lower, upper) = rig.arm.braking_limits(j, speed);
         // Towards where there is more room.
         let up = !lower.is_finite() || upper - home[j] >= home[j] - lower;
-        let way = if up { terms.angle } else { -terms.angle };
-        if !(lower..=upper).contains(&(home[j] + way)) {
-            return broken(format!("{} has no room for {way}", rig.arm.joint_names()[j]));
+        let angle = if up { terms.angle } else { -terms.angle };
+        if !(lower..=upper).contains(&(home[j] + angle)) {
+            return broken(format!("{} has no room for {angle}", rig.arm.joint_names()[j]));
         }
-        for (from, to) in [(0.0, way), (way, 0.0)] {
+        for (from, to) in [(0.0, angle), (angle, 0.0)] {
             let cycles = (terms.angle / speed * 1e9 / PERIOD_NS as f64).ceil();
             for k in 1..=cycles as u64 {
                 let mut command = rig.at(home);
@@ -262,7 +262,7 @@ fn follow<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<(
             let mut there = rig.at(home);
             there.q[j] += to;
             rig.keep(&there, ms(300))?;
-            rig.near(&there.q, terms.tolerance, &format!("after joint {j} moved by {way:.3}"))?;
+            rig.near(&there.q, terms.tolerance, &format!("after joint {j} moved by {angle:.3}"))?;
             let moved = (rig.measured()[j] - home[j] - to).abs();
             if moved > 0.5 * terms.angle {
                 return broken(format!("{} does not move", rig.arm.joint_names()[j]));

@@ -8,21 +8,11 @@ use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use super::Args;
+use super::args::{Args, Hardware};
 use crate::measured::Swept;
 use crate::stage::{Process, Stage};
 use crate::system::{PATIENT_MOCK, VERDICT, start_mock};
 use crate::tracking::Tracking;
-
-/// The endpoint's kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Hardware {
-    /// `mock-hardware`, which judges every setpoint.
-    Mock,
-    /// A PR2 arm in MuJoCo, `examples/mujoco/endpoint.py`.
-    Mujoco,
-}
 
 /// What is read from an endpoint's verdict.
 #[derive(Debug, Deserialize)]
@@ -30,7 +20,7 @@ pub struct Found {
     /// The judge's findings; MuJoCo has no judge.
     pub verdict: Option<Verdict>,
     /// What the endpoint itself did.
-    pub endpoint: Deeds,
+    pub endpoint: Counters,
     /// What the measured positions have swept.
     pub swept: Option<Swept>,
     /// How the arm followed.
@@ -70,7 +60,7 @@ pub struct Run {
 
 /// What the endpoint itself did.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-pub struct Deeds {
+pub struct Counters {
     /// How often it stopped by itself because setpoints ceased.
     pub timeouts: u64,
     /// Setpoints that it did not follow.

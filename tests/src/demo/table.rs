@@ -2,7 +2,7 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::{Outcome, Planned};
+use super::outcome::{Outcome, Planned};
 use crate::tracking::Tracking;
 
 /// The table, the checks and where the report is.

@@ -14,7 +14,7 @@ pub enum Kind {
     Malformed,
     /// A position or velocity is NaN or infinite.
     NotFinite,
-    /// Outside the soft limits, moved in by the way that braking takes at the present speed.
+    /// Outside the soft limits, moved in by the braking distance at the present speed.
     SoftLimit,
     /// Further from the last setpoint than v·T·Δsequence.
     Step,
@@ -142,7 +142,7 @@ pub struct Verdict {
     pub worst_lateness_ns: u64,
     /// The largest step of any joint, as a share of v·T·Δsequence.
     pub largest_step_ratio: f64,
-    /// The least distance of any setpoint from a soft limit moved in by its braking way; negative
+    /// The least distance of any setpoint from a soft limit moved in by its braking distance; negative
     /// outside, infinite where no joint has limits. \[rad\] or \[m\]
     pub least_margin: f64,
     /// The plans in the order in which they were executed.

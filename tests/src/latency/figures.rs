@@ -9,8 +9,9 @@ use comfy_table::{CellAlignment, Table, presets};
 use nullsweep_ipc_types::HISTOGRAM_BUCKETS;
 use serde::Serialize;
 
+use super::args::Args;
+use super::picture;
 use super::stats::{Percentiles, Times, of_buckets};
-use super::{Args, picture};
 use crate::judge::Verdict;
 
 /// One row of the table.

@@ -1,6 +1,7 @@
 //! The latency lab: how late the executor wakes, how long its setpoints take to the endpoint and
 //! a new plan to its first setpoint, beside what the machine does without it, in the same run.
 
+mod args;
 mod baseline;
 mod cyclictest;
 mod figures;
@@ -11,7 +12,6 @@ mod stats;
 
 use std::ffi::OsString;
 use std::fs;
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -32,6 +32,7 @@ use crate::sketch::Sketch;
 use crate::stage::{Process, Stage};
 use crate::system::start_executor;
 use crate::witness::{PATIENCE, Witness};
+use args::Args;
 use figures::Sums;
 use load::Load;
 
@@ -50,42 +51,6 @@ const PUBLISHER: u8 = 5;
 /// moment over the executor's cycle. \[ns\]
 const REST_NS: u64 = 180_000_000;
 const SPREAD_NS: u64 = 40_000_000;
-
-/// Measures the executor's latencies beside bare yardsticks, in alternating rounds.
-#[derive(Debug, Parser)]
-#[command(name = "latency", version)]
-struct Args {
-    /// Seconds for the executor, in all rounds together
-    #[arg(long, default_value_t = 30.0, value_name = "S")]
-    seconds: f64,
-    /// Alternations of yardsticks and executor
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
-    rounds: u32,
-    /// Knots of each plan that is published
-    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(3..=16384))]
-    knots: u32,
-    /// SCHED_FIFO priority of executor and yardsticks; 0 for the default scheduler
-    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
-    priority: u8,
-    /// Seed of the moments at which plans are published
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Write every figure as JSON, to a file or to standard output with -
-    #[arg(long, value_name = "FILE|-")]
-    json: Option<PathBuf>,
-    /// Pin executor, bare loop and cyclictest to this processor
-    #[arg(long, value_name = "N")]
-    cpu: Option<usize>,
-    /// Write the distributions as a picture, a page that needs no network
-    #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
-    /// Have stress-ng load the machine meanwhile
-    #[arg(long)]
-    load: bool,
-    /// Options for the executor, after `--`
-    #[arg(last = true)]
-    executor: Vec<OsString>,
-}
 
 /// Runs the lab with the arguments of a command line, program name first.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
@@ -131,7 +96,8 @@ fn run(args: &Args) -> anyhow::Result<Figures> {
         sums.bare_compute.merge(&bare.compute);
         sums.bare_one_way.merge(&bare.one_way);
         eprintln!("latency: round {round} of {}: executor", args.rounds);
-        measure(args, &arm, &stage, share, &mut random, &mut sums)?;
+        let part = Part { args, arm: &arm, stage: &stage, time: share };
+        measure(&part, &mut random, &mut sums)?;
     }
     drop(load);
     let figures = sums.figures(args, before);
@@ -143,15 +109,18 @@ fn run(args: &Args) -> anyhow::Result<Figures> {
     Ok(figures)
 }
 
-/// One round with an executor, an endpoint in this process, and plans at random moments.
-fn measure(
-    args: &Args,
-    arm: &Arm,
-    stage: &Stage,
+/// The executor's part of one round: what is asked for, and how long it takes.
+#[derive(Clone, Copy)]
+struct Part<'a> {
+    args: &'a Args,
+    arm: &'a Arm,
+    stage: &'a Stage,
     time: Duration,
-    random: &mut ChaCha8Rng,
-    sums: &mut Sums,
-) -> anyhow::Result<()> {
+}
+
+/// One round with an executor, an endpoint in this process, and plans at random moments.
+fn measure(part: &Part<'_>, random: &mut ChaCha8Rng, sums: &mut Sums) -> anyhow::Result<()> {
+    let Part { args, arm, stage, .. } = *part;
     let mut options: Vec<OsString> = vec!["--priority".into(), args.priority.to_string().into()];
     if let Some(cpu) = args.cpu {
         options.extend(["--cpu".into(), cpu.to_string().into()]);
@@ -167,7 +136,7 @@ fn measure(
             let publishing = scope.spawn(|| {
                 // How long an ordinary thread waits for a processor is not the executor's affair.
                 rt::raise(args.priority.min(PUBLISHER));
-                publish(args, arm, stage, &mut executor, time, random, sums)
+                publish(part, &mut executor, random, sums)
             });
             publishing.join()
         });
@@ -199,7 +168,7 @@ fn measure(
     })
 }
 
-/// The priority of what must not get in the executor's way.
+/// The priority of what must not delay the executor.
 fn below(priority: u8) -> u8 {
     priority.saturating_sub(1)
 }
@@ -207,14 +176,12 @@ fn below(priority: u8) -> u8 {
 /// Publishes plans at moments that are drawn in advance, whatever became of the last one, and asks
 /// for the status while the executor is busy with each; the acceptances.
 fn publish(
-    args: &Args,
-    arm: &Arm,
-    stage: &Stage,
+    part: &Part<'_>,
     executor: &mut Process,
-    time: Duration,
     random: &mut ChaCha8Rng,
     sums: &mut Sums,
 ) -> anyhow::Result<Vec<PlanEvent>> {
+    let Part { args, arm, stage, time } = *part;
     let ipc = Ipc::open(stage.robot(), Some(&stage.root()))?;
     let mut witness = Witness::open(&ipc)?;
     let held = witness.mode(Mode::Hold)?;

@@ -103,7 +103,7 @@ fn a_sweep_goes_on_under_another_cost_without_a_stop() {
     assert_eq!(found["violations"], 0, "{found:#}");
     let runs = found["verdict"]["plans"].as_array().expect("plans");
     let join = runs.iter().find(|r| r["plan"] == new.plan.to_string()).expect("it ran");
-    assert!(join["join_step_ratio"].as_f64() > Some(0.0), "the arm was on its way: {join}");
+    assert!(join["join_step_ratio"].as_f64() > Some(0.0), "the arm was moving: {join}");
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn a_plan_is_swapped_at_a_knot_without_a_stop() {
     let found = rig.verdict();
     assert_eq!(plans(&found), [old.to_string(), new.to_string()]);
     let join = &runs(&found)[1];
-    // Without a stop: the arm was on its way when the second plan took over.
+    // Without a stop: the arm was moving when the second plan took over.
     assert!(join["join_step_ratio"].as_f64() > Some(0.0), "{join}");
 }
 
