@@ -187,9 +187,12 @@ pub fn wrap(angle: f64) -> f64 {
     if angle > -PI && angle <= PI {
         return angle;
     }
-    let wrapped = angle - (angle / TAU).round() * TAU;
     // Half a turn rounds either way.
-    if wrapped <= -PI { wrapped + TAU } else { wrapped }
+    match unwrap_near(angle, 0.0) {
+        wrapped if wrapped <= -PI => wrapped + TAU,
+        wrapped if wrapped > PI => wrapped - TAU,
+        wrapped => wrapped,
+    }
 }
 
 /// The same angle, by whole turns nearest to `near`. \[rad\]
@@ -214,6 +217,14 @@ mod tests {
         }
         assert_eq!((wrap(PI), wrap(-PI)), (PI, PI));
         assert!((wrap(-100.0) + 100.0 - 16.0 * TAU).abs() < 1e-12);
+        // Next to half a turn the quotient rounds, and the angle is inside all the same.
+        for turns in -20..=20 {
+            let half = (f64::from(turns) + 0.5) * TAU;
+            for angle in [half.next_down(), half, half.next_up()] {
+                let wrapped = wrap(angle);
+                assert!(wrapped > -PI && wrapped <= PI, "{angle}: {wrapped}");
+            }
+        }
     }
 
     #[test]
