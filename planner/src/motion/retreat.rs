@@ -1,8 +1,8 @@
 //! Lifting the tool off the surface.
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3};
 use nullsweep_collision::{ToolContact, World};
-use nullsweep_robot::{Arm, JointVector, MAX_DOF, Tool};
+use nullsweep_robot::{Arm, JointVector, Tool, damped_step, pose_error};
 
 use crate::plan::LIFT;
 use crate::workcell::Workcell;
@@ -85,19 +85,13 @@ fn back_off(
 fn reach_for(arm: &Arm, target: &Isometry3<f64>, from: &JointVector) -> Option<JointVector> {
     let mut q = *from;
     for _ in 0..LIFT_ITERATIONS {
-        let pose = arm.tip_pose(&q);
-        let linear = target.translation.vector - pose.translation.vector;
-        let angular = (target.rotation * pose.rotation.inverse()).scaled_axis();
-        if linear.norm() < LIFT_TOLERANCE && angular.norm() < LIFT_TOLERANCE {
+        let error = pose_error(&arm.tip_pose(&q), target);
+        if error.fixed_rows::<3>(0).norm() < LIFT_TOLERANCE
+            && error.fixed_rows::<3>(3).norm() < LIFT_TOLERANCE
+        {
             return Some(q);
         }
-        let error = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
-        let jacobian = arm.jacobian(&q);
-        let damped = jacobian * jacobian.transpose() + Matrix6::identity() * (DAMPING * DAMPING);
-        let step = jacobian.transpose() * damped.cholesky()?.solve(&error);
-        for j in 0..MAX_DOF {
-            q[j] += step[j];
-        }
+        q = q + damped_step(&arm.jacobian(&q), &error, DAMPING * DAMPING)?;
     }
     None
 }

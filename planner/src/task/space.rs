@@ -1,10 +1,11 @@
 //! The joint vectors that meet a pose within its tolerance.
 
-use nalgebra::{Cholesky, Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use nullsweep_collision::{ToolContact, World};
-use nullsweep_robot::{Arm, Jacobian, JointVector, MAX_DOF, Tool};
+use nullsweep_robot::{Arm, Jacobian, JointVector, MAX_DOF, Tool, damped_step, wrap};
 
 use super::read::Tolerance;
+use crate::sweep::distance_to_segment;
 
 /// The arm, its tool and its tolerances.
 #[derive(Clone, Copy)]
@@ -122,9 +123,9 @@ impl<'a> Space<'a> {
         let start = *q;
         let limits = self.arm.margined_limits();
         for _ in 0..3 {
-            let gram = jacobian * jacobian.transpose() + Matrix6::identity() * DAMPING;
-            let step = jacobian.transpose() * Cholesky::new(gram)?.solve(&-excess);
-            let scale = (STRIDE / step.amax()).min(1.0);
+            let step = damped_step(&jacobian, &-excess, DAMPING)?;
+            let largest = step.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
+            let scale = (STRIDE / largest).min(1.0);
             let mut stopped = false;
             for (i, &(lower, upper)) in limits.iter().enumerate() {
                 let to = start[i] + scale * step[i];
@@ -164,12 +165,8 @@ impl<'a> Space<'a> {
     /// How far the tool is from the straight line between its places at both ends, `share` of the
     /// way along the straight joint motion. \[m\]
     pub(super) fn deviation_at(&self, a: &Point, b: &Point, share: f64) -> f64 {
-        let at =
-            self.point(a.q.lerp(&b.q, share)).tool.translation.vector - a.tool.translation.vector;
-        let along = b.tool.translation.vector - a.tool.translation.vector;
-        let length = along.norm_squared();
-        let t = if length > 0.0 { (at.dot(&along) / length).clamp(0.0, 1.0) } else { 0.0 };
-        (at - along * t).norm()
+        let at = |point: &Point| Point3::from(point.tool.translation.vector);
+        distance_to_segment(&at(&self.point(a.q.lerp(&b.q, share))), &at(a), &at(b))
     }
 }
 
@@ -186,7 +183,7 @@ fn deviation(pose: &Isometry3<f64>, tool: &Isometry3<f64>) -> [f64; 6] {
         false => (1.0, tilt),
     };
     let turn = 2.0 * off.rotation.k.atan2(off.rotation.w);
-    let turn = nullsweep_robot::wrap(turn);
+    let turn = wrap(turn);
     let t = off.translation.vector;
     [t.x, t.y, t.z, x * share, axis.x * share, turn]
 }
