@@ -15,8 +15,9 @@ use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
 
 use crate::bars::Bars;
 use crate::choices::ObjectArg;
+use crate::exit::OK;
+use crate::json::write_json;
 use crate::scene::{Demo, SceneArgs, scene};
-use crate::{OK, write_json};
 
 #[derive(Debug, Args)]
 pub(super) struct ExperimentArgs {

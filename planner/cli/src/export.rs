@@ -9,8 +9,8 @@ use clap::Args;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::plan::export::write;
 
-use crate::OK;
 use crate::choices::FormatArg;
+use crate::exit::OK;
 
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {

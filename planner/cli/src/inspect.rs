@@ -9,7 +9,8 @@ use nullsweep_planner::cost::{Effort, of_path};
 use nullsweep_planner::plan::Plan;
 use serde::Serialize;
 
-use crate::{OK, write_json};
+use crate::exit::OK;
+use crate::json::write_json;
 
 #[derive(Debug, Args)]
 pub(super) struct InspectArgs {

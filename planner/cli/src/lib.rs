@@ -3,10 +3,12 @@
 mod advice;
 mod bars;
 mod choices;
+mod exit;
 mod experiment;
 mod export;
 mod gtsp;
 mod inspect;
+mod json;
 mod picture;
 mod plan;
 mod publish;
@@ -16,21 +18,13 @@ mod scene;
 mod task;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
+pub use exit::{FAILED, OK, USAGE, VIOLATIONS};
 pub use picture::{joint_axes, motion};
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-
-/// Everything went well.
-pub const OK: u8 = 0;
-/// Bad input, no plan, no executor, a rejection.
-pub const FAILED: u8 = 1;
-/// The command line was wrong (clap's own code).
-pub const USAGE: u8 = 2;
-/// A plan was made but breaks a rule, so it was not written.
-pub const VIOLATIONS: u8 = 3;
 
 /// Plans how a redundant arm sweeps a scanned surface, and publishes the plan.
 #[derive(Debug, Parser)]
@@ -95,15 +89,4 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::from(FAILED)
         }
     }
-}
-
-/// Writes pretty JSON to a file, or to standard output for `-`.
-fn write_json<T: serde::Serialize>(value: &T, to: &std::path::Path) -> anyhow::Result<()> {
-    use anyhow::Context;
-    let text = serde_json::to_string_pretty(value)?;
-    if to == std::path::Path::new("-") {
-        println!("{text}");
-        return Ok(());
-    }
-    std::fs::write(to, text + "\n").with_context(|| format!("cannot write {}", to.display()))
 }

@@ -19,10 +19,11 @@ use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg};
+use crate::exit::{OK, VIOLATIONS};
+use crate::json::write_json;
 use crate::picture::picture;
 use crate::robot::RobotArgs;
 use crate::scene::{Demo, Numbers, SceneArgs, scene};
-use crate::{OK, VIOLATIONS, write_json};
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {

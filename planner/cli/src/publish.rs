@@ -8,8 +8,8 @@ use nullsweep_ipc_types::service::DEFAULT_ROBOT;
 use nullsweep_planner::link::publish::{Join, Patience, describe, publish};
 use nullsweep_planner::plan::Plan;
 
-use crate::OK;
 use crate::choices::JoinArg;
+use crate::exit::OK;
 
 #[derive(Debug, Args)]
 pub(super) struct PublishArgs {

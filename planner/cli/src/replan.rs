@@ -11,8 +11,8 @@ use nullsweep_planner::link::replan::{Site, Start, replan};
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
 
+use crate::exit::{OK, VIOLATIONS};
 use crate::plan::{PlanArgs, make};
-use crate::{OK, VIOLATIONS};
 
 #[derive(Debug, Args)]
 pub(super) struct ReplanArgs {

@@ -10,8 +10,9 @@ use nullsweep_planner::progress::Progress;
 use nullsweep_planner::task::{self, TaskConfig, TaskFigures, Tolerance};
 
 use crate::bars::Bars;
+use crate::exit::{OK, VIOLATIONS};
+use crate::json::write_json;
 use crate::robot::RobotArgs;
-use crate::{OK, VIOLATIONS, write_json};
 
 #[derive(Debug, Args)]
 pub(super) struct TaskArgs {

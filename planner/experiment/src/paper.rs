@@ -151,6 +151,14 @@ const BOBBY_CAR: Table = [
     ],
 ];
 
+/// Mean and sample standard deviation.
+pub(super) fn statistic(values: impl Iterator<Item = f64> + Clone) -> Published {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    let squares: f64 = values.map(|v| (v - mean).powi(2)).sum();
+    (mean, (squares / (count - 1.0).max(1.0)).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

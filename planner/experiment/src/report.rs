@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::methods::{MethodRun, PathFigures, Task, V_MAX, plan};
 use crate::setting::Setting;
-use crate::{Object, Published, Quantity, tables};
+use crate::{Object, Published, Quantity, paper};
 
 /// What is repeated how often.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ pub struct Report {
     pub samples: Vec<usize>,
     /// Where all methods planned.
     pub setting: SettingFigures,
-    /// Cells of the tables.
+    /// Cells of the paper.
     pub cells: Vec<Cell>,
     /// What the straight model leaves out.
     pub straight: Option<Straight>,
@@ -78,7 +78,7 @@ pub struct SettingFigures {
     pub base: [f64; 3],
 }
 
-/// A cell of the tables: every run.
+/// A cell of the paper: every run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// What was minimised.
@@ -167,7 +167,7 @@ impl Report {
             Quantity::Calculation => run.calculation_s,
             Quantity::Processor => run.processor_s,
         });
-        Some(tables::statistic(values))
+        Some(paper::statistic(values))
     }
 }
 

@@ -183,7 +183,7 @@ fn push_tracked(page: &mut String, report: &Report) {
             if rows.is_empty() {
                 continue;
             }
-            let mean = |of: &dyn Fn(&Tracked) -> f64| statistic(rows.iter().map(|r| of(r)));
+            let mean = |of: &dyn Fn(&Tracked) -> f64| paper::statistic(rows.iter().map(|r| of(r)));
             let _ = writeln!(
                 page,
                 "| {cost:?} | {method:?} | {:.0} | {} | {} | {} | {} | {} | {} | {} | {:.2} | {} | \
@@ -253,14 +253,6 @@ pub fn csv(report: &Report) -> String {
     text
 }
 
-/// Mean and sample standard deviation.
-pub(super) fn statistic(values: impl Iterator<Item = f64> + Clone) -> Published {
-    let count = values.clone().count().max(1) as f64;
-    let mean = values.clone().sum::<f64>() / count;
-    let squares: f64 = values.map(|v| (v - mean).powi(2)).sum();
-    (mean, (squares / (count - 1.0).max(1.0)).sqrt())
-}
-
 fn pair((mean, deviation): Published) -> String {
     format!("{mean:.2} ± {deviation:.2}")
 }
@@ -292,9 +284,10 @@ mod tests {
 
     #[test]
     fn mean_and_deviation_of_a_sample() {
-        let (mean, deviation) = statistic([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0].into_iter());
+        let (mean, deviation) =
+            paper::statistic([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0].into_iter());
         assert_eq!(mean, 5.0);
         assert!((deviation - (32.0f64 / 7.0).sqrt()).abs() < 1e-12);
-        assert_eq!(statistic([3.0].into_iter()), (3.0, 0.0));
+        assert_eq!(paper::statistic([3.0].into_iter()), (3.0, 0.0));
     }
 }

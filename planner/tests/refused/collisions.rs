@@ -6,7 +6,7 @@ use nullsweep_planner::plan::Plan;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_robot::JointVector;
 
-use crate::Case;
+use crate::case::Case;
 use crate::stage::{
     detour, judge, link, moved, on_the_line, pad, pad_centre, posture, retimed, scene_with, spoilt,
     stage,

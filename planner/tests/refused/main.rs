@@ -1,44 +1,24 @@
 //! The last gate: a sound plan, spoilt in one way at a time, is refused for just that.
 
+mod case;
 mod collisions;
 mod pad;
 mod stage;
 
-use ViolationKind::{Acceleration, Collision, NotFinite, SoftLimit, TimeOrder, Velocity};
+use case::Case;
 use nullsweep_planner::plan::{Continues, Plan, PlanKnot, Profile};
 use nullsweep_planner::verify::ViolationKind;
-use nullsweep_planner::workcell::Scene;
 use stage::{detour, joint, judge, on_the_line, posture, retimed, spoilt, stage, stretched};
-
-/// A spoilt plan and what must be said of it.
-struct Case {
-    what: &'static str,
-    plan: Plan,
-    /// Instead of the stage's.
-    scene: Option<Scene>,
-    /// The first knot at which it is seen.
-    knot: usize,
-    /// Part of a detail.
-    says: String,
-    /// What else cannot but break with it.
-    also: &'static [ViolationKind],
-}
-
-impl Case {
-    fn new(what: &'static str, plan: Plan, knot: usize, says: impl Into<String>) -> Self {
-        Self { what, plan, scene: None, knot, says: says.into(), also: &[] }
-    }
-}
 
 /// Ways to break each rule. A new kind does not compile without its own.
 fn cases(kind: ViolationKind) -> Vec<Case> {
     match kind {
-        TimeOrder => times(),
-        NotFinite => numbers(),
-        Velocity => speeds(),
-        Acceleration => accelerations(),
-        SoftLimit => limits(),
-        Collision => collisions::cases(),
+        ViolationKind::TimeOrder => times(),
+        ViolationKind::NotFinite => numbers(),
+        ViolationKind::Velocity => speeds(),
+        ViolationKind::Acceleration => accelerations(),
+        ViolationKind::SoftLimit => limits(),
+        ViolationKind::Collision => collisions::cases(),
     }
 }
 
@@ -77,32 +57,32 @@ fn the_unspoilt_plans_are_accepted() {
 
 #[test]
 fn times_out_of_order_are_refused() {
-    check(TimeOrder);
+    check(ViolationKind::TimeOrder);
 }
 
 #[test]
 fn values_that_are_not_finite_are_refused() {
-    check(NotFinite);
+    check(ViolationKind::NotFinite);
 }
 
 #[test]
 fn a_joint_that_is_too_fast_is_refused() {
-    check(Velocity);
+    check(ViolationKind::Velocity);
 }
 
 #[test]
 fn a_joint_that_speeds_up_too_hard_is_refused() {
-    check(Acceleration);
+    check(ViolationKind::Acceleration);
 }
 
 #[test]
 fn a_joint_beyond_its_limits_is_refused() {
-    check(SoftLimit);
+    check(ViolationKind::SoftLimit);
 }
 
 #[test]
 fn a_collision_is_refused() {
-    check(Collision);
+    check(ViolationKind::Collision);
 }
 
 fn times() -> Vec<Case> {
@@ -133,7 +113,10 @@ fn numbers() -> Vec<Case> {
         Case::new(what, spoilt(plan, |knots| spoil(&mut knots[k])), k, says)
     };
     // An infinite place is also an infinite way off.
-    let endless = |case| Case { also: &[Velocity, Acceleration, SoftLimit], ..case };
+    let endless = |case| Case {
+        also: &[ViolationKind::Velocity, ViolationKind::Acceleration, ViolationKind::SoftLimit],
+        ..case
+    };
     vec![
         case("q is NaN", &s.bang, |k| k.q[3] = f64::NAN, "NaN"),
         case("q is NaN, accelerations limited", &s.smooth, |k| k.q[0] = f64::NAN, "NaN"),
@@ -191,7 +174,7 @@ fn speeds() -> Vec<Case> {
         Case::new("half the time", halved, k, name(fastest(&s.bang, k))),
         Case::new("a hundred-thousandth less time", hurried, k, name(fastest(&s.bang, k))),
         Case {
-            also: &[Acceleration, SoftLimit],
+            also: &[ViolationKind::Acceleration, ViolationKind::SoftLimit],
             ..Case::new("three times the velocity in a knot", scaled, quick, name(j))
         },
         Case::new("gently too fast", turning(1.01), 1, "r_wrist_roll_joint: "),
@@ -221,7 +204,7 @@ fn accelerations() -> Vec<Case> {
         Case::new("not at rest at the start", starts, 0, "not at rest"),
         Case::new("cut short in motion", cut, k, "not at rest"),
         Case {
-            also: &[Velocity, SoftLimit],
+            also: &[ViolationKind::Velocity, ViolationKind::SoftLimit],
             ..Case::new("bang-bang, taken for smooth", mislabelled, 1, " of ")
         },
     ]
