@@ -5,17 +5,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use nullsweep_executor::Guard;
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::{JointStates, MAX_HELD_JOINTS, status};
 use nullsweep_robot::Arm;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-use crate::link::msgs::{sensor_msgs, trajectory_msgs};
-use crate::link::{Link, Names, News, Order, Service, moment, ros_time};
-use crate::stream::{DOF, Joints, Message, Rules, Stream};
+use crate::args::{Common, RunArgs};
+use crate::link::msgs::sensor_msgs;
+use crate::link::{Link, Names, News, Order, Service, moment};
+use crate::stream::{DOF, Joints, Rules, Stream};
+use crate::trajectory::trajectory;
 use crate::whole::Whole;
-use crate::{Common, RunArgs};
 
 /// Joint states older than this when they arrive are not passed on: the robot's clock and this
 /// one's disagree, or the network stalls. \[ns\]
@@ -61,7 +63,7 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
         delay_ns,
         timeout_ns: args.timeout * 1_000_000,
         stop_acceleration: args.stop_acceleration,
-        start_tolerance: 0.02,
+        start_tolerance: Guard::START_TOLERANCE,
     });
     let mut told = Told::default();
     let mut due_ns = now_ns();
@@ -288,32 +290,5 @@ impl Ear {
         state.joint_count = DOF as u32;
         self.measured = Some(std::array::from_fn(|j| state.positions[j]));
         Ok(state)
-    }
-}
-
-fn trajectory(message: &Message, names: &[String]) -> trajectory_msgs::JointTrajectory {
-    let mut out = trajectory_msgs::JointTrajectory::default();
-    out.header.seq = message.sequence;
-    out.header.stamp = ros_time(message.start_ns);
-    out.joint_names = names.to_vec();
-    out.points = message.points.iter().map(|p| point(&p.q, Some(&p.v), p.after_ns)).collect();
-    out
-}
-
-/// A point; without velocities the controller goes straight.
-pub fn point(
-    q: &Joints,
-    v: Option<&Joints>,
-    after_ns: u64,
-) -> trajectory_msgs::JointTrajectoryPoint {
-    let time_from_start = roslibrust::codegen::integral_types::Duration {
-        sec: (after_ns / 1_000_000_000) as i32,
-        nsec: (after_ns % 1_000_000_000) as i32,
-    };
-    trajectory_msgs::JointTrajectoryPoint {
-        positions: q.to_vec(),
-        velocities: v.map_or_else(Vec::new, |v| v.to_vec()),
-        time_from_start,
-        ..Default::default()
     }
 }

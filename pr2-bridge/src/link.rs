@@ -11,7 +11,7 @@ use nullsweep_ipc_types::ports::now_ns;
 use roslibrust::ros1::NodeHandle;
 use tokio::sync::mpsc;
 
-use crate::Common;
+use crate::args::Common;
 
 #[allow(missing_docs, clippy::all)] // Generated from msgs/.
 pub mod msgs {
@@ -183,15 +183,27 @@ async fn connect(master: &str) -> anyhow::Result<NodeHandle> {
 async fn start(
     common: &Common,
     names: &Names,
-    mut orders: mpsc::UnboundedReceiver<Order>,
+    orders: mpsc::UnboundedReceiver<Order>,
     news: std_mpsc::Sender<News>,
     known: Arc<Known>,
 ) -> anyhow::Result<()> {
     let node = connect(&common.master).await?;
     known.master_ns.store(now_ns(), Ordering::Relaxed);
+    hear_robot(&node, names, news, &known).await?;
+    hear_flags(&node, common, names, &known).await?;
+    take_orders(&node, common, names, orders).await?;
+    watch_master(common, names, known)
+}
 
+/// Passes on joint states and the ends of goals.
+async fn hear_robot(
+    node: &NodeHandle,
+    names: &Names,
+    news: std_mpsc::Sender<News>,
+    known: &Arc<Known>,
+) -> anyhow::Result<()> {
     let mut joints = node.subscribe::<sensor_msgs::JointState>("/joint_states", 20).await?;
-    let (sender, lost) = (news.clone(), Arc::clone(&known));
+    let (sender, lost) = (news.clone(), Arc::clone(known));
     tokio::spawn(async move {
         while let Some(message) = joints.next().await {
             match message {
@@ -210,9 +222,19 @@ async fn start(
             }
         }
     });
+    Ok(())
+}
+
+/// Keeps what is told of motors and calibration.
+async fn hear_flags(
+    node: &NodeHandle,
+    common: &Common,
+    names: &Names,
+    known: &Arc<Known>,
+) -> anyhow::Result<()> {
     let topic = format!("{}/motors_halted", common.driver);
     let mut halted = node.subscribe::<std_msgs::Bool>(&topic, 5).await?;
-    let own = Arc::clone(&known);
+    let own = Arc::clone(known);
     tokio::spawn(async move {
         while let Some(message) = halted.next().await {
             if let Ok(flag) = message {
@@ -223,7 +245,7 @@ async fn start(
     });
     if let Some(topic) = &names.calibrated {
         let mut calibrated = node.subscribe::<std_msgs::Bool>(topic, 5).await?;
-        let own = Arc::clone(&known);
+        let own = Arc::clone(known);
         tokio::spawn(async move {
             while let Some(message) = calibrated.next().await {
                 if let Ok(flag) = message {
@@ -232,13 +254,22 @@ async fn start(
             }
         });
     }
+    Ok(())
+}
 
+/// Sends messages and calls services as they are ordered.
+async fn take_orders(
+    node: &NodeHandle,
+    common: &Common,
+    names: &Names,
+    mut orders: mpsc::UnboundedReceiver<Order>,
+) -> anyhow::Result<()> {
     let topic = format!("{}/command", names.controller);
     let command = node.advertise::<trajectory_msgs::JointTrajectory>(&topic, 20, false).await?;
     let topic = format!("{}/follow_joint_trajectory/goal", names.controller);
     let goal =
         node.advertise::<control_msgs::FollowJointTrajectoryActionGoal>(&topic, 5, false).await?;
-    let driver = common.driver.clone();
+    let (node, driver) = (node.clone(), common.driver.clone());
     tokio::spawn(async move {
         while let Some(order) = orders.recv().await {
             let failed = match order {
@@ -265,7 +296,11 @@ async fn start(
             }
         }
     });
+    Ok(())
+}
 
+/// Asks the master again and again whether the controller listens.
+fn watch_master(common: &Common, names: &Names, known: Arc<Known>) -> anyhow::Result<()> {
     let end = if names.goals { "follow_joint_trajectory/goal" } else { "command" };
     let topic = format!("{}/{end}", names.controller);
     let master = common.master.clone();

@@ -8,18 +8,18 @@ use nullsweep_ipc_types::{
 };
 use nullsweep_robot::{Arm, JointKind};
 
-use crate::endpoint::point;
 use crate::link::msgs::control_msgs;
 use crate::link::{Link, Order, ros_time};
 use crate::stream::{DOF, Joints};
+use crate::trajectory::point;
 
 /// A goal starts so long after it is sent. \[ns\]
 const AHEAD_NS: u64 = 200_000_000;
-/// From where the arm is to the first knot, at most 0.02 rad away. \[ns\]
+/// From where the arm is to the first knot, at most the guard's start tolerance away. \[ns\]
 const CONNECT_NS: u64 = 500_000_000;
 /// Time between two telemetry samples. \[ns\]
 const TELL_NS: u64 = 10_000_000;
-/// The controller's word for an end as planned.
+/// The controller's code for an end as planned.
 const SUCCEEDED: u8 = 3;
 
 /// A goal that the controller has.
@@ -60,7 +60,7 @@ impl Whole {
             guard: Guard::new(arm.limits()),
             fingerprint: arm.fingerprint(),
             held_continuous,
-            held_tolerance: 0.01,
+            held_tolerance: Rules::HELD_TOLERANCE,
             since_ns: now_ns(),
         };
         Ok(Self {

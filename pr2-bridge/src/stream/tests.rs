@@ -1,0 +1,194 @@
+//! A controller that takes messages, and setpoints with every trouble.
+
+use super::*;
+
+const MS: u64 = 1_000_000;
+const RULES: Rules =
+    Rules { delay_ns: 60 * MS, timeout_ns: 20 * MS, stop_acceleration: 4.0, start_tolerance: 0.02 };
+
+fn setpoint(sequence: u64, q: f64, v: f64) -> Setpoint {
+    let mut s = <Setpoint as bytemuck::Zeroable>::zeroed();
+    s.sequence = sequence;
+    s.deadline_ns = 1000 * MS + sequence * MS;
+    s.joint_count = DOF as u32;
+    s.mode = Mode::Executing.wire();
+    s.positions[0] = q;
+    s.velocities[0] = v;
+    s
+}
+
+#[test]
+fn messages_join_where_setpoints_end_and_come_to_rest() {
+    let mut stream = Stream::new(RULES);
+    let mut messages = Vec::new();
+    for k in 1..=100u64 {
+        let s = setpoint(k, 1e-3 * k as f64, 1.0);
+        stream.take(&s, &std::array::from_fn(|j| s.positions[j]));
+        if k % 20 == 0 {
+            messages.extend(stream.message(1000 * MS + k * MS));
+        }
+    }
+    assert_eq!(messages.len(), 5);
+    for pair in messages.windows(2) {
+        let (a, b) = (&pair[0], &pair[1]);
+        let joint = a.points[a.points.len() - 2];
+        // The next one begins just before the last setpoint of this one is due.
+        assert_eq!(b.start_ns + EARLY_NS, a.start_ns + joint.after_ns);
+        assert_eq!(joint.v[0], 1.0);
+    }
+    for message in &messages {
+        assert!(message.points.windows(2).all(|w| w[1].after_ns > w[0].after_ns));
+        let [.., last, rest] = message.points[..] else { panic!("two points") };
+        // 1 rad/s is stopped in 0.25 s over 0.125 rad.
+        assert_eq!(rest.v, [0.0; DOF]);
+        assert!((rest.q[0] - last.q[0] - 0.125).abs() < 1e-12);
+        assert_eq!(rest.after_ns - last.after_ns, 250 * MS);
+    }
+    // What is measured 80 ms after a deadline was asked for 20 ms after it.
+    assert_eq!(stream.in_force(1080 * MS + 60 * MS), Some((80, 1080 * MS)));
+}
+
+#[test]
+fn what_is_too_late_or_too_far_is_not_followed() {
+    let mut stream = Stream::new(RULES);
+    stream.take(&setpoint(1, 0.1, 0.0), &[0.0; DOF]);
+    assert!(!stream.follows() && stream.refused == 1);
+    // It says that it waits, so that the executor's setpoints come to the arm.
+    assert!(stream.stopped(1001 * MS) == Some(Stop::Far) && stream.in_force(2000 * MS).is_none());
+    stream.take(&setpoint(2, 0.01, 0.0), &[0.0; DOF]);
+    assert!(stream.follows() && stream.stopped(1002 * MS).is_none());
+    assert_eq!(stream.in_force(2000 * MS), Some((2, 1002 * MS)));
+    // The process stalled: its stamp would lie in the past.
+    assert_eq!(stream.message(1063 * MS), None);
+    assert!(!stream.follows() && stream.late == 1);
+    let mut nan = setpoint(3, 0.0, 0.0);
+    nan.positions[3] = f64::NAN;
+    stream.take(&nan, &[0.0; DOF]);
+    assert!(!stream.follows());
+}
+
+/// The controller's part: at its stamp a message takes over, from the desired state there.
+struct Controller {
+    segments: Vec<(u64, u64, [[f64; 2]; 2])>,
+}
+
+impl Controller {
+    fn at(&self, now: u64) -> [f64; 2] {
+        let Some(&(start, end, [[q0, v0], [q1, v1]])) =
+            self.segments.iter().rev().find(|s| s.0 <= now)
+        else {
+            return [0.0; 2];
+        };
+        if now > end {
+            return [q1, 0.0];
+        }
+        let h = (end - start) as f64 * 1e-9;
+        let u = (now - start) as f64 / (end - start) as f64;
+        let (d, a, b) = (q1 - q0, v0 * h, v1 * h);
+        let (c2, c3) = (3.0 * d - 2.0 * a - b, a + b - 2.0 * d);
+        [q0 + u * (a + u * (c2 + u * c3)), (a + u * (2.0 * c2 + 3.0 * u * c3)) / h]
+    }
+
+    fn take(&mut self, message: &Message) {
+        let mut from = (message.start_ns, self.at(message.start_ns));
+        self.segments.retain(|s| s.0 < message.start_ns);
+        for point in &message.points {
+            let to = (message.start_ns + point.after_ns, [point.q[0], point.v[0]]);
+            self.segments.push((from.0, to.0, [from.1, to.1]));
+            from = to;
+        }
+    }
+}
+
+#[test]
+fn following_begins_without_a_jump() {
+    let mut stream = Stream::new(RULES);
+    let mut controller = Controller { segments: Vec::new() };
+    // The controller holds at 0, the arm is measured a little beside it.
+    let (mut before, mut fastest) = (0.0, 0.0f64);
+    for k in 1..=400u64 {
+        stream.take(&setpoint(k, 0.002, 0.0), &[0.001; DOF]);
+        if k % 20 == 0 {
+            stream.message((1000 + k) * MS).iter().for_each(|m| controller.take(m));
+        }
+        let [q, _] = controller.at((1000 + k) * MS);
+        fastest = fastest.max((q - before).abs() / 1e-3);
+        before = q;
+    }
+    assert!((before - 0.002).abs() < 1e-3, "{before}");
+    assert!(fastest < 0.1, "{fastest} rad/s");
+}
+
+#[test]
+fn missed_deadlines_are_no_jump() {
+    for missed in [0, 1, 5, 20] {
+        let mut stream = Stream::new(RULES);
+        let mut controller = Controller { segments: Vec::new() };
+        let (mut deadline, mut q, mut speed) = (1000 * MS, 0.005, 0.0);
+        let mut steepest: f64 = 0.0;
+        let mut before = [0.0; 2];
+        for k in 1..=4000u64 {
+            // It speeds up to 0.5 rad/s at 1 rad/s², and the executor stalls every 0.4 s.
+            let stall = if k % 400 == 0 { missed } else { 0 };
+            for _ in 0..=stall {
+                deadline += MS;
+                if deadline % (20 * MS) == 0 {
+                    stream.message(deadline).iter().for_each(|m| controller.take(m));
+                }
+                let at = controller.at(deadline);
+                steepest = steepest.max((at[1] - before[1]).abs() / 1e-3);
+                before = at;
+            }
+            if k > 700 {
+                speed = f64::min(speed + 1e-3, 0.5);
+                q += speed * 1e-3;
+            }
+            let mut s = setpoint(k, q, speed);
+            s.deadline_ns = deadline + MS;
+            // The arm stands a little beside the first setpoint.
+            stream.take(&s, &[0.0; DOF]);
+        }
+        assert_eq!(stream.late, 0);
+        assert!((q - before[0]).abs() < 0.05 && (before[1] - 0.5).abs() < 0.2, "{before:?}");
+        assert!(steepest < 2.5, "{missed} missed: {steepest} rad/s²");
+    }
+}
+
+#[test]
+fn what_came_too_late_is_told_until_it_follows_again() {
+    let mut stream = Stream::new(RULES);
+    let mut measured = [0.0; DOF];
+    for k in 1..=20 {
+        stream.take(&setpoint(k, 1e-3 * k as f64, 1.0), &measured);
+    }
+    let message = stream.message(1020 * MS).expect("one");
+    let rest_ns = message.start_ns + message.points.last().expect("one").after_ns;
+    stream.take(&setpoint(21, 0.021, 1.0), &measured);
+    assert_eq!(stream.message(1090 * MS), None);
+    assert!(stream.late == 1 && stream.stopped(1021 * MS) == Some(Stop::Late));
+    // The executor follows the arm, which has not come to rest: not yet.
+    measured[0] = 0.1;
+    stream.take(&setpoint(100, 0.1, 0.0), &measured);
+    assert!(!stream.follows() && stream.stopped(1100 * MS).is_some());
+    let k = (rest_ns - 60 * MS) / MS - 1000 + 1;
+    stream.take(&setpoint(k, 0.14, 0.0), &[0.14; DOF].map(|q| q * measured[0].signum()));
+    assert!(!stream.follows(), "the other joints are far");
+    measured[0] = 0.14;
+    stream.take(&setpoint(k + 1, 0.14, 0.0), &measured);
+    assert!(stream.follows() && stream.stopped((1001 + k) * MS).is_none());
+}
+
+#[test]
+fn standing_still_sends_one_message_and_ceasing_lets_go() {
+    let mut stream = Stream::new(RULES);
+    let mut count = 0;
+    for k in 1..=100u64 {
+        stream.take(&setpoint(k, 0.0, 0.0), &[0.0; DOF]);
+        if k % 20 == 0 {
+            count += usize::from(stream.message(1000 * MS + k * MS).is_some());
+        }
+    }
+    assert_eq!(count, 1);
+    assert!(stream.stopped(1120 * MS).is_none() && stream.follows());
+    assert!(stream.stopped(1121 * MS) == Some(Stop::Ceased) && !stream.follows());
+}
