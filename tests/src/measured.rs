@@ -22,8 +22,8 @@ pub struct Swept {
 /// another. Between two of them the pad must move less than a third of its width.
 #[must_use]
 pub fn swept(plan: &Plan, arm: &Arm, postures: impl Iterator<Item = JointVector>) -> Swept {
-    let contact = plan.tool.contact_in_tip();
-    let poses: Vec<Isometry3<f64>> = postures.map(|q| arm.tip_pose(&q) * contact).collect();
+    let tool = plan.tool.on(arm);
+    let poses: Vec<Isometry3<f64>> = postures.map(|q| tool.pose(&q)).collect();
     let points: Vec<_> = plan.surface.iter().map(|s| Point3::from(s.point)).collect();
     let scan = Scan {
         raw: points.clone(),
@@ -58,7 +58,7 @@ mod tests {
     /// A plan whose surface is these points of the contact frame at home.
     fn plan(arm: &Arm, points: &[([f64; 3], bool)]) -> Plan {
         let tool = Tool::default();
-        let contact = arm.tip_pose(&arm.home()) * tool.contact_in_tip();
+        let contact = tool.on(arm).pose(&arm.home());
         let surface = points
             .iter()
             .map(|(p, reachable)| SurfaceSample {

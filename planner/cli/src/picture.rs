@@ -1,6 +1,5 @@
 //! What a run looks like: the report's data.
 
-use nalgebra::Point3;
 use nullsweep_planner::pipeline::Outcome;
 use nullsweep_planner::plan::Plan;
 use nullsweep_report::{JointAxis, Motion, PatchMark, ReportData, Table};
@@ -66,16 +65,12 @@ pub fn joint_axes(arm: &Arm) -> Vec<JointAxis> {
 /// A plan as the report shows a motion, from time 0 on.
 #[must_use]
 pub fn motion(name: &str, plan: &Plan, arm: &Arm) -> Motion {
-    let contact = plan.tool.contact_in_tip();
+    let pad = plan.tool.on(arm);
     Motion {
         name: name.into(),
         times: plan.knots.iter().map(|k| k.time_ns as f64 * 1e-9).collect(),
         joints: (0..arm.dof()).map(|j| plan.knots.iter().map(|k| k.q[j]).collect()).collect(),
-        tool: plan
-            .knots
-            .iter()
-            .map(|k| Point3::from((arm.tip_pose(&k.q) * contact).translation.vector))
-            .collect(),
+        tool: plan.knots.iter().map(|k| pad.centre(&k.q)).collect(),
         contact: (0..plan.knots.len()).map(|k| plan.on_surface(k)).collect(),
     }
 }

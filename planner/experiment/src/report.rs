@@ -252,7 +252,7 @@ pub fn look_between(
         &[],
         &Options::default(),
     )?;
-    let contact = setting.tool.contact_in_tip();
+    let tool = setting.tool.on(&setting.arm);
     let continuous = setting.arm.continuous();
     let free = |run: &MethodRun, k: usize| world.is_free(&run.path[k].1, ToolContact::Allowed);
     let mut straight = Straight { poses: run.path.len(), ..Straight::default() };
@@ -270,8 +270,7 @@ pub fn look_between(
         for k in 1..STEPS {
             let t = k as f64 / STEPS as f64;
             let between = p.lerp(&q, t);
-            let pad = setting.arm.tip_pose(&between) * contact;
-            off.push(off_surface(setting, &pad.translation.vector.into()));
+            off.push(off_surface(setting, &tool.centre(&between)));
         }
     }
     off.sort_by(f64::total_cmp);

@@ -108,7 +108,7 @@ impl Setting {
     /// The pad's contact frame before the first motion.
     #[must_use]
     pub fn tool_pose(&self) -> Isometry3<f64> {
-        self.arm.tip_pose(&self.start) * self.tool.contact_in_tip()
+        self.tool.on(&self.arm).pose(&self.start)
     }
 
     /// Appends the samples at a stop: `count` values of the redundancy as in §V, a few of them each

@@ -147,16 +147,13 @@ impl<C: Cost> Moves for Mover<'_, C> {
         let start = from.map_or(self.source, |s| s.q);
         let joints = jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
         let cost = self.lift + cost::of_path(self.cost, &joints);
-        let contact = self.cell.tool.contact_in_tip();
-        let pad = |q: &JointVector| {
-            Point3::from((self.cell.arm.tip_pose(q) * contact).translation.vector)
-        };
+        let pad = self.cell.tool.on(self.cell.arm);
         let mut line = vec![None; joints.len()];
         if from.is_some() {
-            line[0] = Some(pad(&joints[0]));
+            line[0] = Some(pad.centre(&joints[0]));
         }
         if let (Some(last), Some(q)) = (line.last_mut(), joints.last()) {
-            *last = Some(pad(q));
+            *last = Some(pad.centre(q));
         }
         Some(Motion { cost, path: Leg { joints, line } })
     }

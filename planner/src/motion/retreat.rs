@@ -41,7 +41,7 @@ pub fn retract(
     q: &JointVector,
     distance: f64,
 ) -> Option<Vec<JointVector>> {
-    let contact = arm.tip_pose(q) * tool.contact_in_tip();
+    let contact = tool.on(arm).pose(q);
     let normal = contact.rotation * -Vector3::z();
     let up = Vector3::z();
     let home = -contact.translation.vector.component_mul(&Vector3::new(1.0, 1.0, 0.0)).normalize();

@@ -91,7 +91,7 @@ impl Planning<'_> {
             graph::build(cell, nodes, &job.graph, before.map(|b| &b.graph), progress)
         });
         progress.stage("tour", None);
-        let tool_pose = cell.arm.tip_pose(&self.start) * job.tool.contact_in_tip();
+        let tool_pose = job.tool.on(cell.arm).pose(&self.start);
         let tour = clock.time("gtsp", || {
             let order = match job.method {
                 Method::Tsp => formulation::shortest,

@@ -93,8 +93,8 @@ impl<C: Cost> Completion<'_, C> {
     /// Takes out what the leg sweeps.
     fn sweep(&self, leg: &Leg, left: &mut [bool]) {
         let Planning { cell, scan, job, .. } = self.planning;
-        let contact = job.tool.contact_in_tip();
-        let poses: Vec<_> = leg.joints.iter().map(|q| cell.arm.tip_pose(q) * contact).collect();
+        let tool = job.tool.on(cell.arm);
+        let poses: Vec<_> = leg.joints.iter().map(|q| tool.pose(q)).collect();
         for (left, swept) in left.iter_mut().zip(coverage::swept(scan, &poses, &job.tool)) {
             *left &= !swept;
         }

@@ -55,7 +55,7 @@ pub(super) fn start(job: &Job, arm: &Arm, world: &World) -> Result<Start, Pipeli
     let joints: Vec<String> = q[..arm.dof()].iter().map(|v| format!("{v:.2}")).collect();
     let joints = joints.join(",");
     let note =
-        format!("the arm cannot start at {name} ({error}): planned from --start={joints} instead");
+        format!("the arm cannot start at {name} ({error}): planned from joints {joints} instead");
     Ok(Start { q, note: Some(note) })
 }
 

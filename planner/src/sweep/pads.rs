@@ -22,7 +22,7 @@ pub struct Pad {
 /// The pad along every segment on the surface.
 #[must_use]
 pub fn pad_motion(path: Trajectory<'_>, arm: &Arm) -> Vec<Pad> {
-    let contact_in_tip = path.tool.contact_in_tip();
+    let tool = path.tool.on(arm);
     (1..path.knots.len())
         .into_par_iter()
         .flat_map_iter(|k| {
@@ -33,7 +33,7 @@ pub fn pad_motion(path: Trajectory<'_>, arm: &Arm) -> Vec<Pad> {
             (first..=steps).filter_map(move |s| {
                 let (from, to) = line?;
                 let q = curve.at(s as f64 / steps as f64);
-                let pose = arm.tip_pose(&q) * contact_in_tip;
+                let pose = tool.pose(&q);
                 let pad = Point3::from(pose.translation.vector);
                 // Between knots the pad may be a little ahead of the line's points, or behind.
                 let around = [(k.checked_sub(2), k - 1), (Some(k), k + 1)];

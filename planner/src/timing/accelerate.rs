@@ -146,13 +146,10 @@ impl Judge<'_> {
     /// The pad's centre near the planned line, where there is one.
     fn is_on_line(&self, i: usize, halves: &[Piece; 2]) -> bool {
         let Some(corner) = self.plan.line(i) else { return true };
-        let contact = self.cell.tool.contact_in_tip();
-        let pad = |q: &JointVector| {
-            Point3::from((self.cell.arm.tip_pose(q) * contact).translation.vector)
-        };
+        let pad = self.cell.tool.on(self.cell.arm);
         let near = |q: &JointVector, other: Option<Point3<f64>>| {
             let end = other.unwrap_or(corner);
-            distance_to_segment(&pad(q), &corner, &end) <= BLEND_TOLERANCE
+            distance_to_segment(&pad.centre(q), &corner, &end) <= BLEND_TOLERANCE
         };
         let (before, after) = (
             self.plan.line(i - 1).filter(|_| self.plan.on_surface(i)),

@@ -1,6 +1,5 @@
 //! Collisions along every segment.
 
-use nalgebra::Point3;
 use nullsweep_collision::{Exact, ToolContact};
 use nullsweep_robot::Arm;
 use rayon::prelude::*;
@@ -48,9 +47,8 @@ pub(super) fn collisions(
 /// down: those next to a knot on the surface, or at the plan's start, until the pad's centre is
 /// [`LIFT`] away, with some slack. There it may still touch.
 fn lifts(plan: &Plan, arm: &Arm) -> Vec<bool> {
-    let contact = plan.tool.contact_in_tip();
-    let centre =
-        |k: usize| Point3::from((arm.tip_pose(&plan.knots[k].q) * contact).translation.vector);
+    let tool = plan.tool.on(arm);
+    let centre = |k: usize| tool.centre(&plan.knots[k].q);
     let mut lifts = vec![false; plan.knots.len()];
     let starts_in_contact = |k: usize| plan.knots[k].line.is_some() || k == 0;
     for k in 0..plan.knots.len() {

@@ -97,9 +97,9 @@ impl StanceSearch {
         let mut poses = vec![Isometry3::identity(); robot.links().len()];
         arm.link_poses(&JointVector::ZERO, &mut poses);
         let pivot = poses[arm.moving_links()[0]].translation.vector;
-        let contact = tool.contact_in_tip();
+        let pad = tool.on(arm);
         let reach = (0..REACH_SAMPLES)
-            .map(|k| ((arm.tip_pose(&arm.spread(k)) * contact).translation.vector - pivot).norm())
+            .map(|k| (pad.centre(&arm.spread(k)).coords - pivot).norm())
             .fold(0.0, f64::max);
         let share =
             |i: u32| NEAREST + (FARTHEST - NEAREST) * f64::from(i) / f64::from(DISTANCES - 1);
