@@ -3,8 +3,8 @@
 use nullsweep_robot::{Arm, JointVector, MAX_DOF};
 use wide::f32x8;
 
-/// The cost of a straight joint motion. Implement it for a cost of your own; every search in
-/// this crate is generic over it.
+/// The cost of a straight joint motion. The layered search, the motions and the Joint-GTSP
+/// are generic over it; which cost a job takes is [`CostKind`](crate::plan::CostKind)'s to say.
 ///
 /// A cost must be non-negative, zero for no motion and must not fall when a displacement grows,
 /// so that the straight line between two ends is a lower bound for every path between them.
@@ -77,8 +77,7 @@ impl Cost for TaskTime {
     }
 }
 
-/// The velocity of each joint: the robot's limits, or one `v_max` for all where that is lower
-/// or where it is asked for. Unused lanes are 0. \[rad/s\] or \[m/s\]
+/// The velocity of each joint: the robot's limits, or one `v_max` for all where that is lower. Unused lanes are 0. \[rad/s\] or \[m/s\]
 #[must_use]
 pub fn velocities(arm: &Arm, v_max: Option<f64>) -> JointVector {
     let mut velocity = [0.0; MAX_DOF];

@@ -293,7 +293,6 @@ fn job(args: &PlanArgs, robot: &Robot, after: Option<After>) -> anyhow::Result<J
     ensure!(args.start.len() <= MAX_DOF, "--start has more than {MAX_DOF} joints");
     let mut start: JointVector = JointVector::ZERO;
     start[..args.start.len()].copy_from_slice(&args.start);
-    let line_wave = tool.width;
     Ok(Job {
         arm: args.robot.spec()?,
         tool,
@@ -309,7 +308,6 @@ fn job(args: &PlanArgs, robot: &Robot, after: Option<After>) -> anyhow::Result<J
         graph: GraphConfig {
             neighbours: args.neighbours,
             radius: args.radius,
-            line_wave,
             ..GraphConfig::default()
         },
         formulation: FormulationConfig {

@@ -17,9 +17,10 @@ use crate::shapes::{distance, pose, poses};
 /// crate's kinematics. Slow: for the verification.
 ///
 /// It stands alone, so that it and the fast check ([`World`](crate::World)) can be tested against
-/// each other. What they share is made before either: the prepared shapes, the list of pairs to
-/// check and the margins. Bounds, sphere trees, the distance grid and the fast check's own
-/// kinematics have no part in it, and it leaves no pair out because of a proof.
+/// each other. What they share is made before either: the prepared shapes, which of them move and
+/// which are rigid to each other, the list of pairs to check, the margins and the contact rule. Bounds,
+/// sphere trees, the distance grid and the poses by which the fast check goes have no part in it, and
+/// it leaves no pair out because of a proof.
 pub struct Exact {
     arm: Arm,
     scene: Scene,

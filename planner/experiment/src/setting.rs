@@ -99,6 +99,7 @@ impl Setting {
         let graph = graph::unchecked(
             Nodes { surface: &surface, patches: &patches, reached: &reached },
             &job.graph,
+            tool.width,
         );
         let start = arm.home();
         let tool = tool.clone();

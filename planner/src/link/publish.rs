@@ -40,10 +40,10 @@ pub enum PublishError {
     /// A port failed while waiting.
     #[error("waiting for the executor: {0}")]
     Port(#[from] PortError),
-    /// `--join knot` for a plan that continues none.
+    /// To be joined at a knot, but it continues no plan.
     #[error("the plan does not continue another one, so there is no knot to join")]
     ContinuesNothing,
-    /// `--join knot` while nothing is executed.
+    /// To be joined at a knot while nothing is executed.
     #[error("the executor executes no plan that could be joined")]
     NothingRuns,
     /// No telemetry came.

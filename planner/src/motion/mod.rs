@@ -6,6 +6,8 @@ pub mod layered;
 mod mover;
 mod retreat;
 mod rrt_connect;
+#[cfg(test)]
+mod tests;
 
 pub use jump::jump;
 pub use mover::{Leg, Mover, lift_cost};

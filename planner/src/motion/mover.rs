@@ -45,17 +45,18 @@ pub struct Mover<'a, C> {
     stops: &'a [usize],
     cost: &'a C,
     source: JointVector,
-    /// Added to every jump, so that the tool does not leave the surface for a trifle: the cost of
-    /// a quarter turn of one joint after the other.
+    /// Added to every jump, so that the tool does not leave the surface for a trifle: see
+    /// [`lift_cost`].
     lift: f64,
     seed: u64,
 }
 
-/// What a jump adds to a tracked motion: each of these joints moves this far. \[rad\]
+/// Joints whose motion is what a jump adds.
 const LIFT_JOINTS: usize = 4;
+/// How far each of them moves. \[rad\]
 const LIFT_ANGLE: f64 = 0.8;
 
-/// What a jump adds to its way, for an arm of `dof` joints.
+/// What a jump costs besides its path: four joints moved by 0.8 rad, for an arm of `dof` joints.
 #[must_use]
 pub fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
     let mut lift = JointVector::ZERO;

@@ -184,7 +184,8 @@ impl<C: Cost> Insertion<'_, C> {
     fn reach_from(&self, stop: usize) -> Option<(Sample, Motion<Leg>)> {
         let Planning { job, surface, .. } = self.planning;
         let Visit { patch, sample: from, .. } = &self.visits[stop];
-        let edge = Edge::between(surface, self.patches, *patch, self.patch, &job.graph)?;
+        let edge =
+            Edge::between(surface, self.patches, *patch, self.patch, &job.graph, job.tool.width)?;
         let heading = edge.heading_b + from.heading - edge.heading_a;
         let mut targets: Vec<Sample> = self.samples(heading);
         targets.retain(|to| to.branch == from.branch);

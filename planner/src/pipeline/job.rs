@@ -27,7 +27,8 @@ pub struct Job {
     pub method: Method,
     /// What is minimised.
     pub cost: CostKind,
-    /// Samples of the inverse kinematics at each tool pose, 1…
+    /// Values of the redundancy parameter at each tool pose, 1…; each gives a sample for every branch.
+    /// Reach looks at no fewer than 24.
     pub ik_samples: usize,
     /// One velocity for all joints; `None`: the robot's limits. \[rad/s\]
     pub v_max: Option<f64>,

@@ -14,7 +14,7 @@ use crate::tour::joint::{self, Cluster, JointConfig, Metric, Problem};
 use crate::workcell::redundancies;
 
 impl Planning<'_> {
-    /// The tour by [`formulation::Method::Joint`] over the samples that are free of collision. The
+    /// The tour by [`Method::Joint`](crate::plan::Method::Joint) over the samples that are free of collision. The
     /// straight joint motion stands for the tracked one, which it bounds; a change of branch costs
     /// what lifting off does besides.
     pub(super) fn joint_tour(
@@ -86,6 +86,7 @@ impl Planning<'_> {
         for stop in formulation::incident_stops(graph, patch) {
             let turns: &[f64] =
                 if self.cell.tool.symmetric { &[0.0, std::f64::consts::PI] } else { &[0.0] };
+            // Both turns are of the one stop, whose heading the tour is told.
             for turn in turns {
                 let turned = Stop { heading: stop.heading + turn, ..stop };
                 let contact = formulation::pose(patches, self.cell.tool, &turned);

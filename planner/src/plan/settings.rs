@@ -1,4 +1,5 @@
-//! The choices that a plan is made by, and that its file keeps.
+//! The choices that a plan is made by, which its file keeps, and the lengths that all who make or
+//! check plans go by.
 
 use serde::{Deserialize, Serialize};
 

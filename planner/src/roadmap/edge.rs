@@ -14,15 +14,13 @@ pub struct GraphConfig {
     pub radius: f64,
     /// Step of the surface line between two patches. \[m\]
     pub line_step: f64,
-    /// Shortest wave of the normal along that line: as long as the pad is wide. \[m\]
-    pub line_wave: f64,
     /// Redundancy values that are tried before an edge is given up.
     pub edge_samples: usize,
 }
 
 impl Default for GraphConfig {
     fn default() -> Self {
-        Self { neighbours: 8, radius: 0.10, line_step: 0.006, line_wave: 0.07, edge_samples: 100 }
+        Self { neighbours: 8, radius: 0.10, line_step: 0.006, edge_samples: 100 }
     }
 }
 
@@ -46,7 +44,8 @@ pub struct Edge {
 
 impl Edge {
     /// The edge along the surface line between two patches, whether or not the arm can follow it;
-    /// `None` where there is no line.
+    /// `None` where there is no line. `wave` is the shortest wave
+    /// of the normal along it: as long as the pad is wide. \[m\]
     #[must_use]
     pub fn between(
         surface: &Surface,
@@ -54,9 +53,10 @@ impl Edge {
         a: usize,
         b: usize,
         config: &GraphConfig,
+        wave: f64,
     ) -> Option<Self> {
         let end = |i: usize| SurfacePoint { point: patches[i].centre, normal: patches[i].normal };
-        let line = surface.line(&end(a), &end(b), config.line_step, config.line_wave)?;
+        let line = surface.line(&end(a), &end(b), config.line_step, wave)?;
         let last = line.len() - 1;
         Some(Self {
             a,
@@ -66,12 +66,6 @@ impl Edge {
             line,
             turn: 0.0,
         })
-    }
-
-    /// Straight distance between the two patches. \[m\]
-    #[must_use]
-    pub fn chord(&self) -> f64 {
-        (self.line[self.line.len() - 1].point - self.line[0].point).norm()
     }
 
     /// The patch at the other end.

@@ -90,7 +90,7 @@ pub fn build(
         .map(|&(a, b)| {
             let known = before.and_then(|graph| graph.known(a, b));
             let edge = known.unwrap_or_else(|| {
-                let edge = Edge::between(surface, patches, a, b, config)?;
+                let edge = Edge::between(surface, patches, a, b, config, cell.tool.width)?;
                 let mut turned: Vec<TurnedEdge> =
                     TURNS.iter().map(|turn| TurnedEdge::new(cell, patches, &edge, *turn)).collect();
                 let even = turned.iter_mut().position(|edge| edge.is_followed(cell, &values));
@@ -109,11 +109,11 @@ pub fn build(
 /// The graph of the paper's model, between whose nodes no arm is followed: each patch's nearest
 /// neighbours joined wherever a surface line leads.
 #[must_use]
-pub fn unchecked(nodes: Nodes<'_>, config: &GraphConfig) -> Graph {
+pub fn unchecked(nodes: Nodes<'_>, config: &GraphConfig, wave: f64) -> Graph {
     let Nodes { surface, patches, reached } = nodes;
     let (mut edges, mut apart) = (Vec::new(), Vec::new());
     for (a, b) in neighbour_pairs(patches, reached, config) {
-        match Edge::between(surface, patches, a, b, config) {
+        match Edge::between(surface, patches, a, b, config, wave) {
             Some(edge) => edges.push(edge),
             None => apart.push((a, b)),
         }

@@ -49,8 +49,8 @@ const MAX_STEP: f64 = 0.8;
 impl Workcell<'_> {
     /// Follows the path from one sample to another on one branch, the redundancy parameter
     /// changing evenly. All joint vectors of the result are inside the limits, the whole motion
-    /// is proven free of collision, the pad on the surface, and the pad stays within 0.1 mm of the
-    /// line.
+    /// is proven free of collision, the pad on the surface, and in the
+    /// middle between two of them the pad is within 0.1 mm of the line.
     ///
     /// # Errors
     /// Says what ended the branch and where. [`Self::detour`] may still find a way.

@@ -3,7 +3,7 @@
 use nullsweep_robot::{JointVector, MAX_DOF};
 use rayon::prelude::*;
 
-use super::smooth_path::{Piece, SmoothPath, distance};
+use super::smooth_path::{Piece, SmoothPath};
 
 /// Halvings of a blend until the arm stops in the corner instead.
 const MAX_HALVINGS: u32 = 12;
@@ -22,7 +22,7 @@ pub fn smooth(
     points: &[JointVector],
     fits: &(dyn Fn(usize, &[Piece; 2]) -> bool + Sync),
 ) -> Vec<SmoothPath> {
-    let legs: Vec<f64> = points.windows(2).map(|w| distance(&w[0], &w[1])).collect();
+    let legs: Vec<f64> = points.windows(2).map(|w| w[0].distance(&w[1])).collect();
     let blends: Vec<Option<[Piece; 2]>> = (0..points.len())
         .into_par_iter()
         .map(|i| {
@@ -112,29 +112,29 @@ mod tests {
         for run in &runs {
             for pair in run.pieces.windows(2) {
                 let (a, b) = (&pair[0], &pair[1]);
-                assert!(distance(&a.at(a.length), &b.start) < 1e-12);
-                assert!(distance(&a.slope_at(a.length), &b.slope) < 1e-12);
+                assert!(a.at(a.length).distance(&b.start) < 1e-12);
+                assert!(a.slope_at(a.length).distance(&b.slope) < 1e-12);
                 assert!((a.source[1] - b.source[0]).abs() < 1e-12);
             }
             let last = run.pieces[run.pieces.len() - 1];
             stops.push(last.at(last.length));
             assert!(last.source[1] == 2.0 || last.source[1] == 4.0);
         }
-        assert!(distance(&stops[0], &points[2]) < 1e-12);
-        assert!(distance(&stops[1], &points[4]) < 1e-12);
+        assert!(stops[0].distance(&points[2]) < 1e-12);
+        assert!(stops[1].distance(&points[4]) < 1e-12);
         for piece in runs.iter().flat_map(|r| &r.pieces) {
             for k in 0..=8 {
                 let q = piece.at(piece.length * f64::from(k) / 8.0);
                 let off = points
                     .windows(2)
                     .map(|w| {
-                        let leg = distance(&w[0], &w[1]);
+                        let leg = w[0].distance(&w[1]);
                         let along: f64 =
                             (0..2).map(|j| (q[j] - w[0][j]) * (w[1][j] - w[0][j])).sum();
                         let share = (along / (leg * leg)).clamp(0.0, 1.0);
                         let foot: JointVector =
                             JointVector::from_fn(|j| w[0][j] + share * (w[1][j] - w[0][j]));
-                        distance(&q, &foot)
+                        q.distance(&foot)
                     })
                     .fold(f64::INFINITY, f64::min);
                 assert!(off <= 0.02 + 1e-9, "{off} at {:?}", piece.source);
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(straight, 2);
         // The circle's curvature is 1.
         for p in runs[0].pieces.iter().filter(|p| p.bend != JointVector::ZERO) {
-            let bend = distance(&p.bend, &JointVector::new([0.0; MAX_DOF]));
+            let bend = p.bend.distance(&JointVector::ZERO);
             assert!((bend - 1.0).abs() < 0.01, "{bend}");
         }
     }

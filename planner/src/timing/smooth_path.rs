@@ -1,6 +1,6 @@
 //! A smooth joint path: quadratic pieces that meet in position and direction.
 
-use nullsweep_robot::{JointVector, MAX_DOF};
+use nullsweep_robot::JointVector;
 
 /// q(s) = start + slope·s + bend·s²/2 for s from 0 to `length`. The path parameter s is any
 /// parameter; the joint's unit is \[rad\] or \[m\].
@@ -60,9 +60,4 @@ impl Piece {
         ];
         Self { length: b - a, start: self.at(a), slope: self.slope_at(a), bend: self.bend, source }
     }
-}
-
-/// Euclidean over all joints.
-pub(super) fn distance(a: &JointVector, b: &JointVector) -> f64 {
-    (0..MAX_DOF).map(|j| (b[j] - a[j]).powi(2)).sum::<f64>().sqrt()
 }

@@ -52,11 +52,11 @@ pub enum FormulationError {
     Solve(#[from] SolveError),
 }
 
-/// Price of going between patches that no edge joins (Eq. 3's h): dearer than any whole tour. \[m\]
+/// Price of going between patches that no edge joins (Eq. 3's h): more than any whole tour. \[m\]
 /// or weighed [m and rad]
 pub const JUMP: f64 = 1e4;
 
-/// [`Method::Tsp`]: the shortest Euclidean way, from `tool_pose` (the contact frame in the root
+/// [`Method::Tsp`](crate::plan::Method::Tsp): the shortest Euclidean path, from `tool_pose` (the contact frame in the root
 /// frame) on, the headings along it.
 ///
 /// # Errors
@@ -74,7 +74,7 @@ pub fn shortest(
     })
 }
 
-/// [`Method::Curvature`]: the way of least length and turning (Eq. 4), from `tool_pose` (the
+/// [`Method::Curvature`](crate::plan::Method::Curvature): the path of least length and turning (Eq. 4), from `tool_pose` (the
 /// contact frame in the root frame) on.
 ///
 /// # Errors

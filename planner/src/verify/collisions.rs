@@ -1,4 +1,4 @@
-//! Collisions along every segment.
+//! Collisions of the standing body, and of the arm along every segment.
 
 use nullsweep_collision::{Exact, ToolContact};
 use nullsweep_robot::Arm;
@@ -11,6 +11,13 @@ use crate::plan::{LIFT, Plan};
 const COLLISION_STEP: f64 = 0.02;
 /// What a lift may exceed [`LIFT`] by. \[m\]
 const LIFT_SLACK: f64 = 0.002;
+
+/// What does not move with the arm (base, torso, the other arm) against the scene, as a violation of
+/// the first knot.
+pub(super) fn standing(exact: &Exact) -> Option<Violation> {
+    let kind = ViolationKind::Collision;
+    exact.stance_hit().map(|hit| Violation { knot: 0, kind, detail: hit.to_string() })
+}
 
 /// Exact collision checks along every segment.
 pub(super) fn collisions(

@@ -7,10 +7,10 @@ use nullsweep_surface::{Scan, Surface};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::collisions::collisions;
+use super::collisions::{collisions, standing};
 use super::kinematics::kinematics;
 use super::violation::{Violation, ViolationKind};
-use crate::plan::{Plan, Stretch};
+use crate::plan::{Plan, PlanError, Stretch};
 use crate::sweep::{Pad, coverage, pad_motion};
 use crate::workcell::Scene;
 
@@ -60,14 +60,23 @@ pub enum VerifyError {
     /// The collision check cannot be made.
     #[error(transparent)]
     Collision(#[from] CollisionError),
-    /// The plan is of another arm.
-    #[error("the plan is for joints {planned}, the arm has {found}")]
+    /// The plan is of another robot or arm.
+    #[error(
+        "the plan is for {planned} with fingerprint {plan:016x}, the arm given is {found} with {arm:016x}"
+    )]
     OtherArm {
         /// The plan's joints.
         planned: String,
+        /// The plan's fingerprint of robot and arm.
+        plan: u64,
         /// The arm's joints.
         found: String,
+        /// The arm's fingerprint.
+        arm: u64,
     },
+    /// The plan cannot be sent to any executor.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
     /// The plan is of another scan.
     #[error("the plan was made for {planned} scanned points, the scene has {found}")]
     OtherScan {
@@ -90,6 +99,7 @@ pub fn verify(
     tick: &(dyn Fn() + Sync),
 ) -> Result<Verification, VerifyError> {
     let arm = arm_of(plan, given)?;
+    plan.message_parts()?;
     let scene = given.scene.transformed(&plan.base_pose().inverse());
     let scan = &scene.surface;
     let is_scanned = !scan.points.is_empty();
@@ -98,12 +108,14 @@ pub fn verify(
         return Err(VerifyError::OtherScan { planned, found });
     }
     let mut violations = kinematics(plan, &arm);
-    if violations.iter().any(|v| v.kind == ViolationKind::NotFinite) {
+    let is_finite = !violations.iter().any(|v| v.kind == ViolationKind::NotFinite);
+    if !is_finite || plan.knots.len() < 2 {
         violations.sort_by_key(|v| v.knot);
         return Ok(Verification { violations, ..Verification::default() });
     }
     let (points, obstacles) = (scene.points(), &scene.obstacles);
     let exact = Exact::new(given.robot, &arm, &plan.tool, &points, obstacles, given.collision)?;
+    violations.extend(standing(&exact));
     let (collisions, collision_checks) = collisions(plan, &arm, &exact, tick);
     violations.extend(collisions);
     violations.sort_by_key(|v| v.knot);
@@ -136,9 +148,10 @@ pub fn verify(
 fn arm_of(plan: &Plan, given: Given<'_>) -> Result<Arm, VerifyError> {
     let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
     let arm = given.robot.arm(given.arm)?.with_held(&held)?;
-    if plan.joints != arm.joint_names() {
+    if plan.joints != arm.joint_names() || plan.fingerprint != arm.fingerprint() {
         let (planned, found) = (plan.joints.join(", "), arm.joint_names().join(", "));
-        return Err(VerifyError::OtherArm { planned, found });
+        let (plan, arm) = (plan.fingerprint, arm.fingerprint());
+        return Err(VerifyError::OtherArm { planned, plan, found, arm });
     }
     Ok(arm)
 }

@@ -14,6 +14,9 @@ const ROUNDING: f64 = 1e-6;
 pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
     let mut found = Vec::new();
     let mut report = |knot, kind, detail| found.push(Violation { knot, kind, detail });
+    if plan.knots.len() < 2 {
+        report(0, ViolationKind::TimeOrder, format!("{} knots, no motion", plan.knots.len()));
+    }
     for (k, knot) in plan.knots.iter().enumerate() {
         if knot.q.iter().chain(&knot.v).any(|v| !v.is_finite()) {
             report(k, ViolationKind::NotFinite, format!("q {:?}, v {:?}", *knot.q, *knot.v));

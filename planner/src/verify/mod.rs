@@ -1,10 +1,12 @@
-//! The last gate: the finished plan, checked again from its knots. A plan that fails is never
-//! published.
+//! The last gate: the finished plan, checked again from its knots. The command line writes no plan
+//! that fails.
 //!
 //! It gets the plan, the robot and the scene as they were given, and asks nothing of what the search
 //! made: it builds its own arm, its own slow collision check over every point and its own surface.
-//! With the search it shares what lies below both: forward kinematics, link shapes and the pairs of
-//! links that are checked, the interpolation between knots and the rule of what the pad covers.
+//! What it shares with the search lies below both, see ARCHITECTURE.md. From the plan it takes, beside
+//! the knots, where the pad is meant to be on the surface (only there it may touch, and how far it
+//! leaves that line is a figure, not a rule), which points belong to reachable patches, and what was
+//! swept before.
 
 mod collisions;
 mod gate;

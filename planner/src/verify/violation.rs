@@ -17,17 +17,17 @@ pub struct Violation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ViolationKind {
-    /// Knot times do not start at 0 or do not rise.
+    /// There are fewer than two knots, or their times do not start at 0 or do not rise.
     TimeOrder,
     /// A value is not finite.
     NotFinite,
     /// A joint is faster than its limit.
     Velocity,
     /// A joint of a plan with limited acceleration speeds up or slows down by more than its limit,
-    /// or is not at rest at the end.
+    /// or is not at rest at the start or the end.
     Acceleration,
     /// A joint is outside its soft limits with their braking margin at its velocity.
     SoftLimit,
-    /// The arm, its tool or the body collides.
+    /// The arm or its tool collides, or the body does where it stands.
     Collision,
 }

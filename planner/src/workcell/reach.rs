@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::contact::{contact_pose, direction};
 use super::sample::{Sample, Workcell, middle_out, redundancies};
 
-/// Headings at which a patch is tried, evenly over half a turn: with a pad that turns about the
+/// Headings at which a patch is tried, evenly over a turn, of a symmetric tool over half of one: with a pad that turns about the
 /// arm's last axis one would do, other arms and the gripper's shape want several.
 const HEADINGS: usize = 8;
 

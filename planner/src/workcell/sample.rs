@@ -27,7 +27,7 @@ pub struct Sample {
     pub branch: Branch,
     /// Value of the redundancy parameter. \[rad\]
     pub redundancy: f64,
-    /// Heading of the pad about the surface normal, from [`tangents`]' first axis. \[rad\]
+    /// Heading of the pad about the surface normal, from the first of the normal's [`tangents`](super::tangents). \[rad\]
     pub heading: f64,
 }
 
@@ -117,7 +117,7 @@ impl Workcell<'_> {
     }
 }
 
-/// The same values, the middle one first, the ends last.
+/// Values of the redundancy parameter, the middle one first, the ends last.
 #[must_use]
 pub fn middle_out(mut values: Vec<f64>) -> Vec<f64> {
     let middle = values.iter().sum::<f64>() / values.len().max(1) as f64;

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3};
 use nullsweep_collision::Obstacle;
 use nullsweep_surface::{Region, Scan};
 
-/// The surface to sweep and what is around it, in one frame: the floor frame, unless it says
-/// otherwise.
+/// The surface to sweep and what is around it, in one frame: the floor frame where it is
+/// given.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The scanned surface that is to be swept.

@@ -8,7 +8,8 @@ use nullsweep_surface::{Patch, Scan};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::workcell::{contact_pose, direction, redundancies};
+use super::contact::{contact_pose, direction};
+use super::sample::redundancies;
 
 /// The pose of the robot's root frame on the floor and the positions of joints outside the arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,7 +61,7 @@ pub struct StanceSearch {
 }
 
 impl Default for StanceSearch {
-    /// For the PR2: 0.4–1.2 m away, three heights of its torso.
+    /// For the PR2: 0.35–1.15 m away, four heights of its torso.
     fn default() -> Self {
         Self {
             pivot: [0.0; 2],

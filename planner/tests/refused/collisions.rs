@@ -104,6 +104,7 @@ pub(crate) fn cases() -> Vec<Case> {
     higher.obstacles[0] = Obstacle::floor(Isometry3::translation(0.0, 0.0, 0.1));
     // Only the first knot is where the arm may not be: what ends there was never looked at.
     let starts_folded = from_knot(&folded, 3);
+    let in_the_torso = scene_with("pillar", Vector3::repeat(0.02), Vector3::new(-0.05, 0.0, 0.5));
     let case = Case::new;
     vec![
         case("the hand in the seat", retimed(pressed), k, "scan point"),
@@ -112,6 +113,10 @@ pub(crate) fn cases() -> Vec<Case> {
         case("the hand in the body", across, 2, "l_shoulder_pan_link"),
         case("the arm folded", folded, 3, "r_forearm_link"),
         case("the sponge dragged along", dragged, from, "sponge is"),
+        Case {
+            scene: Some(in_the_torso),
+            ..case("a pillar where the robot stands", s.bang.clone(), 0, "obstacle pillar")
+        },
         case("it begins in itself", starts_folded, 0, "r_forearm_link"),
         Case {
             scene: Some(post),

@@ -93,10 +93,6 @@ pub struct LayeredPath<M> {
     pub motions: Vec<Motion<M>>,
     /// Sum of the motions' costs.
     pub cost: f64,
-    /// Searches that were needed.
-    pub rounds: usize,
-    /// Motions that were tried.
-    pub tried: usize,
 }
 
 /// The search ends when it could gain no more than this share of the cost.
@@ -124,7 +120,7 @@ pub fn shortest<C: Cost, M: Moves>(
     let mut search = Search::new(problem, visited);
     let mut made: HashMap<Key, Motion<M::Path>> = HashMap::new();
     let mut best: Option<(f64, Vec<Key>)> = None;
-    let (mut rounds, mut tried, mut dirty) = (0, 0, 0);
+    let (mut rounds, mut dirty) = (0, 0);
     loop {
         rounds += 1;
         search.update(dirty);
@@ -144,9 +140,8 @@ pub fn shortest<C: Cost, M: Moves>(
         let enough = best.as_ref().is_some_and(|(cost, _)| estimate >= cost * (1.0 - GAP));
         if open.is_empty() || enough || (best.is_some() && rounds > MAX_ROUNDS) {
             let (_, keys) = best.take().filter(|_| !open.is_empty()).unwrap_or((0.0, keys));
-            return search.finish(&keys, made, rounds, tried);
+            return search.finish(&keys, made);
         }
-        tried += open.len();
         let attempts: Vec<Result<Motion<M::Path>, Option<Blocked>>> =
             open.par_iter().map(|&p| search.attempt(p, &keys[p])).collect();
         dirty = usize::MAX;
@@ -321,13 +316,7 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
     }
 
     /// The path of motions that were all made.
-    fn finish(
-        self,
-        keys: &[Key],
-        mut made: HashMap<Key, Motion<M::Path>>,
-        rounds: usize,
-        tried: usize,
-    ) -> LayeredPath<M::Path> {
+    fn finish(self, keys: &[Key], mut made: HashMap<Key, Motion<M::Path>>) -> LayeredPath<M::Path> {
         let motions: Vec<Motion<M::Path>> =
             keys.iter().filter_map(|key| made.remove(key)).collect();
         LayeredPath {
@@ -335,8 +324,6 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
             choice: keys.iter().map(|key| key.to.1).collect(),
             cost: motions.iter().map(|m| m.cost).sum(),
             motions,
-            rounds,
-            tried,
         }
     }
 
