@@ -32,7 +32,8 @@ pub(super) fn collisions(
         .map(|k| {
             let curve = plan.curve(k);
             let steps = curve.steps(COLLISION_STEP);
-            let may_touch = plan.on_surface(k) || lifts[k];
+            // A plan may begin on the surface, where another one left the arm.
+            let may_touch = k == 0 || plan.on_surface(k) || lifts[k];
             let contact = if may_touch { ToolContact::Allowed } else { ToolContact::Forbidden };
             let hit = (1..=steps).find_map(|s| {
                 let q = curve.at(s as f64 / steps as f64);
