@@ -139,7 +139,7 @@ fn swap_at_random(seed: u64, swaps: u32) -> String {
             sim.order(Order::Speed(1.0));
             sim.order(Order::Resume);
         }
-        if sim.mode() == Mode::Hold && dice.below(4) == 0 {
+        if matches!(sim.mode(), Mode::Hold | Mode::Init) && dice.below(4) == 0 {
             // After a disable.
             sim.order(Order::Resume);
             sim.run(20);

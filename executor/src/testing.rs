@@ -142,6 +142,8 @@ pub(crate) struct Sim {
     pub now: u64,
     pub arm: JointVector,
     pub status: u32,
+    /// Whether its motors were asked off: then they are.
+    pub off: bool,
     /// Whether the endpoint sends states.
     pub speaks: bool,
     pub events: Vec<Event>,
@@ -164,6 +166,7 @@ impl Sim {
             now: 1_000 * MS,
             arm: HOME,
             status: status::CALIBRATED,
+            off: false,
             speaks: true,
             events: Vec::new(),
             lives: HashMap::new(),
@@ -194,7 +197,7 @@ impl Sim {
             setpoint_sequence: self.pipe[0].0,
             joint_count: self.guard.dof,
             q: self.arm,
-            status: self.status,
+            status: self.status | if self.off { status::HALTED } else { 0 },
         }
     }
 
@@ -279,6 +282,7 @@ impl Sim {
             let a = (target.v[j] - self.last_v[j]).abs() / self.guard.period();
             self.top_acceleration = self.top_acceleration.max(a);
         }
+        self.off = target.disable;
         self.last = Some(target.q);
         self.last_v = target.v;
         self.arm = self.pipe[0].1;

@@ -43,7 +43,7 @@ impl State {
                 self.mode = Mode::Executing;
                 Verdict::Accepted
             }
-            Mode::Hold if self.disabled => {
+            Mode::Hold | Mode::Init if self.disabled => {
                 self.disabled = false;
                 self.mode = Mode::Init;
                 Verdict::Accepted

@@ -66,11 +66,17 @@ impl State {
         self.fail(fault, Reaction::Follow, out);
     }
 
+    /// Whether the endpoint only does what it was asked to: its motors are off. A reset switches them
+    /// on again, and the endpoint is waited for in Init.
+    fn is_asked_for(&self, fault: Fault) -> bool {
+        fault == Fault::Halted && self.is_off()
+    }
+
     /// Whether the cause of the latched fault is gone.
     pub(super) fn is_cleared(&self, now_ns: u64, guard: &Guard) -> bool {
         self.path.is_none()
             && self.watch.age(now_ns) < guard.stale_ns
-            && self.watch.endpoint().is_none()
+            && self.watch.endpoint().is_none_or(|(fault, _)| self.is_asked_for(fault))
     }
 
     /// Forgets what was counted before a fault.

@@ -73,3 +73,78 @@ fn offers_in_every_mode() {
         }
     }
 }
+
+/// What an operator may do in any mode, but for ending the executor.
+const ORDERS: [Order; 7] = [
+    Order::Status,
+    Order::Pause,
+    Order::Resume,
+    Order::Stop,
+    Order::StopAndDisable,
+    Order::Speed(0.0),
+    Order::Reset,
+];
+
+/// What then happens to the endpoint, for a while.
+const TROUBLES: [(&str, bool, u32); 4] = [
+    ("nothing", true, 0),
+    ("silence", false, 0),
+    ("error", true, status::ERROR),
+    ("halt", true, status::HALTED),
+];
+
+/// From every mode, after any two orders and whatever trouble that is over, the same few commands
+/// lead to where a plan is taken and finished. The endpoint is halted while its motors are asked
+/// off.
+#[test]
+fn every_state_has_a_way_out_by_commands() {
+    for mode in Mode::ALL {
+        for (first, second) in ORDERS.iter().flat_map(|a| ORDERS.iter().map(move |b| (a, b))) {
+            for (trouble, speaks, bits) in TROUBLES {
+                let mut sim = in_mode(*mode);
+                sim.order(*first);
+                sim.run(150);
+                sim.order(*second);
+                sim.run(20);
+                let before = sim.status;
+                (sim.speaks, sim.status) = (speaks, before | bits);
+                sim.run(150);
+                (sim.speaks, sim.status) = (true, status::CALIBRATED);
+                sim.run(50);
+                let what = format!("{first:?}, {second:?} in {mode}, then {trouble}");
+                for order in [Order::Reset, Order::Resume, Order::Speed(1.0), Order::Stop] {
+                    sim.order(order);
+                    sim.run(200);
+                }
+                let after = sim.state.snapshot();
+                assert_eq!(after.mode, Mode::Hold, "{what}: {}", after.fault);
+                assert!(!sim.off, "{what}: the motors are on");
+                let held = sim.last.unwrap();
+                let offer = plan(&sim.guard, 99, JoinRule::StopThenStart, &line(held));
+                only(&sim.offer(offer), Accepted);
+                sim.run_until(Mode::Hold, 500);
+                assert_eq!(sim.story(99), [Accepted, Started, Finished], "{what}");
+            }
+        }
+    }
+}
+
+/// The case that was seen: the arm stands faulted, the operator takes the motors off to be safe, and
+/// then goes on.
+#[test]
+fn motors_taken_off_after_a_fault_come_on_again_with_a_reset() {
+    let mut sim = in_mode(Mode::Fault);
+    sim.status = status::CALIBRATED;
+    assert_eq!(sim.order(Order::StopAndDisable).verdict, Verdict::Accepted);
+    sim.run(10);
+    assert!(sim.off);
+    // What it was not asked to is still a cause.
+    sim.status |= status::ERROR;
+    sim.run(2);
+    assert_eq!(sim.order(Order::Reset).verdict, Verdict::StillFaulty);
+    sim.status = status::CALIBRATED;
+    sim.run(2);
+    assert_eq!(sim.order(Order::Reset).verdict, Verdict::Accepted);
+    sim.run(5);
+    assert_eq!((sim.mode(), sim.off), (Mode::Hold, false));
+}
