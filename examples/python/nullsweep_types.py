@@ -298,6 +298,8 @@ class Reason(enum.IntEnum):
     STOPPED = 15
     FAULT = 16
     SHUTDOWN = 17
+    ACCELERATION = 19
+    REPEATED = 20
 
 
 _TEXTS[EventKind] = {
@@ -327,6 +329,8 @@ _TEXTS[Reason] = {
     Reason.STOPPED: "stopped by command",
     Reason.FAULT: "ended by a fault",
     Reason.SHUTDOWN: "the executor shut down",
+    Reason.ACCELERATION: "above the acceleration limit",
+    Reason.REPEATED: "a plan of this id came before",
 }
 
 

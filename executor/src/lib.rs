@@ -15,6 +15,7 @@ mod driver;
 mod executor;
 mod guard;
 mod hardware;
+mod ids;
 mod interpolate;
 mod path;
 mod record;

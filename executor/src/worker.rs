@@ -11,6 +11,7 @@ use nullsweep_ipc_types::{EventKind, Knot, MAX_KNOTS, Reason};
 
 use crate::admit::{Held, Rejection, Rules, admit};
 use crate::cycle::Event;
+use crate::ids::Ids;
 use crate::record::Recorder;
 use crate::slots::Slots;
 
@@ -28,6 +29,7 @@ pub(crate) struct Worker<'a> {
     rules: Rules,
     copy: Vec<Knot>,
     held: Option<Held>,
+    ids: Ids,
     recorder: Option<Recorder>,
 }
 
@@ -40,7 +42,8 @@ impl<'a> Worker<'a> {
     ) -> Result<Self, IpcError> {
         let receiver = ipc.plan_receiver()?;
         let copy = Vec::with_capacity(MAX_KNOTS);
-        Ok(Self { ipc, receiver, slots, rules, copy, held: None, recorder })
+        let (held, ids) = (None, Ids::default());
+        Ok(Self { ipc, receiver, slots, rules, copy, held, ids, recorder })
     }
 
     /// Runs until `done`.
@@ -97,7 +100,7 @@ impl<'a> Worker<'a> {
         let start = Instant::now();
         let admitted = admit(&header, &self.copy, self.held.as_ref(), &self.rules, now_ns());
         let checked = start.elapsed();
-        let result = admitted.and_then(|plan| {
+        let result = self.ids.judge(header.id, admitted).and_then(|plan| {
             let (knots, seconds) = (plan.knots().len(), plan.duration() * 1e-9);
             let plan = Arc::new(plan.checked(now_ns()));
             if let Some(recorder) = &mut self.recorder {

@@ -65,6 +65,10 @@ wire_enum! {
         Fault = 16 => "ended by a fault",
         /// The executor shut down.
         Shutdown = 17 => "the executor shut down",
+        /// A curve speeds a joint up or slows it down by more than its limit.
+        Acceleration = 19 => "above the acceleration limit",
+        /// A plan of the same id came before: that one alone counts.
+        Repeated = 20 => "a plan of this id came before",
     }
 }
 

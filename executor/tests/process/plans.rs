@@ -27,6 +27,11 @@ fn a_plan_from_publication_to_its_end() {
     let id = publisher.publish(&header, &knots).unwrap();
     assert_eq!(next(&events, id), (EventKind::Accepted, Reason::None));
     assert_eq!(next(&events, id), (EventKind::Started, Reason::None));
+    // The same once more while it runs: that one is refused, and the running one goes on.
+    let mut again = PlanHeader { id, knot_count: knots.len() as u32, ..header };
+    again.checksum = checksum(PlanMessage { header: &again, knots: &knots });
+    publisher.publish_raw(&again, &knots).unwrap();
+    assert_eq!(next(&events, id), (EventKind::Rejected, Reason::Repeated));
     assert_eq!(next(&events, id), (EventKind::Finished, Reason::None));
     let telemetry = system.ipc.telemetry_receiver().unwrap();
     let end = Instant::now() + Duration::from_secs(5);
