@@ -231,6 +231,13 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
             bail!("{name} must be a positive number, not {value}")
         }
     };
+    let from_zero = |name: &str, value: f64, most: f64| {
+        if (0.0..=most).contains(&value) {
+            Ok(value)
+        } else {
+            bail!("{name} must be from 0 to {most}, not {value}")
+        }
+    };
     let nanos = |name: &str, ms: f64| positive(name, ms).map(|ms| (ms * 1e6) as u64);
     let rate = f64::from(args.rate);
     let guard = Guard {
@@ -241,8 +248,8 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         lost_ns: nanos("--lost-ms", args.lost_ms)?,
         held_drift: 2.0 * positive("--held-tolerance", args.held_tolerance)?,
         following_error: positive("--following-error", args.following_error)?,
-        following_lag: args.following_lag.max(0.0),
-        min_rate: args.min_rate.clamp(0.0, 1.0) * rate,
+        following_lag: from_zero("--following-lag", args.following_lag, 10.0)?,
+        min_rate: from_zero("--min-rate", args.min_rate, 1.0)? * rate,
         ..Guard::new(arm.limits())
     };
     if guard.lost_ns < guard.stale_ns {

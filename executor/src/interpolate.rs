@@ -6,6 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::Interpolation;
 
+use crate::total::greater;
 use crate::{JointVector, MAX_DOF};
 
 /// A knot as the loop reads it.
@@ -60,7 +61,7 @@ pub fn sample(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, time: f64) -> Sam
     Sample { q: JointVector::new(q), v: velocity_at(a, b, kind, u) }
 }
 
-/// The greatest speed of joint `j` within the segment. \[rad/s\]
+/// The greatest speed of joint `j` within the segment, NaN where that is no number. \[rad/s\]
 #[must_use]
 pub fn top_speed(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> f64 {
     match kind {
@@ -68,19 +69,42 @@ pub fn top_speed(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> f
         Interpolation::Cubic => {
             let c = Cubic::new(a, b, j);
             // The velocity is a parabola: its ends and its vertex bound it.
-            let vertex = (-c.c2 / (3.0 * c.c3)).clamp(0.0, 1.0);
-            let inner = if vertex.is_nan() { 0.0 } else { c.slope(vertex).abs() };
-            c.slope(0.0).abs().max(c.slope(1.0).abs()).max(inner) / seconds(a, b)
+            if !c.is_finite() {
+                return f64::NAN;
+            }
+            // No vertex where it is a straight line.
+            let vertex = -c.c2 / (3.0 * c.c3);
+            let inside = vertex > 0.0 && vertex < 1.0;
+            let inner = if inside { c.slope(vertex).abs() } else { 0.0 };
+            greater(greater(c.slope(0.0).abs(), c.slope(1.0).abs()), inner) / seconds(a, b)
         }
     }
 }
 
-/// The lowest and highest position of joint `j` within the segment. \[rad\]
+/// The greatest acceleration of joint `j` within a curve, NaN where that is no number; it is linear
+/// in time. A straight segment has none but in its corners. \[rad/s²\]
+#[must_use]
+pub fn top_acceleration(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> f64 {
+    match kind {
+        Interpolation::Linear => 0.0,
+        Interpolation::Cubic => {
+            let c = Cubic::new(a, b, j);
+            let ends = [2.0 * c.c2, 2.0 * c.c2 + 6.0 * c.c3];
+            greater(ends[0].abs(), ends[1].abs()) / seconds(a, b).powi(2)
+        }
+    }
+}
+
+/// The lowest and highest position of joint `j` within the segment, NaN where one of them is no
+/// number. \[rad\]
 #[must_use]
 pub fn reach(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> (f64, f64) {
-    let (mut low, mut high) = (a.q[j].min(b.q[j]), a.q[j].max(b.q[j]));
+    let (mut low, mut high) = (-greater(-a.q[j], -b.q[j]), greater(a.q[j], b.q[j]));
     if kind == Interpolation::Cubic {
         let c = Cubic::new(a, b, j);
+        if !c.is_finite() {
+            return (f64::NAN, f64::NAN);
+        }
         // Where 3 c3 u² + 2 c2 u + c1 = 0, in the form that does not cancel.
         let root = (c.c2 * c.c2 - 3.0 * c.c3 * c.c1).max(0.0).sqrt();
         let k = -(c.c2 + root.copysign(c.c2));
@@ -108,6 +132,10 @@ impl Cubic {
         let d = b.q[j] - a.q[j];
         let (v0, v1) = (a.v[j] * h, b.v[j] * h);
         Self { a: a.q[j], c1: v0, c2: 3.0 * d - 2.0 * v0 - v1, c3: v0 + v1 - 2.0 * d }
+    }
+
+    fn is_finite(&self) -> bool {
+        [self.a, self.c1, self.c2, self.c3].iter().all(|c| c.is_finite())
     }
 
     fn position(&self, u: f64) -> f64 {

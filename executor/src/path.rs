@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::admit::ValidPlan;
 use crate::guard::Guard;
 use crate::interpolate::{PlanKnot, Sample, sample};
+use crate::total::{limited, within};
 use crate::{JointVector, MAX_DOF};
 
 /// Cycles after which a predicted stop is given up: the slowest ramp takes 1,000 at 1 kHz.
@@ -141,8 +142,8 @@ impl Path {
         } else {
             self.plan.knots().get(from.segment).map_or(1.0, |k| k.ramp)
         };
-        let step = ramp * guard.period();
-        let rate = from.rate + (target - from.rate).clamp(-step, step);
+        let most = ramp * guard.period();
+        let rate = from.rate + limited(target - from.rate, most);
         let time = from.time + 0.5 * (from.rate + rate) * guard.period_ns as f64;
         Progress { time, rate, segment: self.segment(from.segment, time) }
     }
@@ -227,13 +228,13 @@ impl Connector {
             duration: ((2.0 * rise + cruise) * 1e9).ceil(),
             rise,
             acceleration,
-            ramp: (guard.stop_acceleration / (top * farthest)).clamp(1.0, 50.0),
+            ramp: within(guard.stop_acceleration / (top * farthest), 1.0, 50.0),
         }
     }
 
     fn sample(&self, elapsed: f64, rate: f64) -> Sample {
         let total = self.duration * 1e-9;
-        let t = (elapsed * 1e-9).clamp(0.0, total);
+        let t = within(elapsed * 1e-9, 0.0, total);
         let (a, rise) = (self.acceleration, self.rise);
         let (share, speed) = if t <= rise {
             (0.5 * a * t * t, a * t)
@@ -246,7 +247,7 @@ impl Connector {
         let mut s = Sample { q: self.to, v: JointVector::ZERO };
         for j in 0..MAX_DOF {
             let d = self.to[j] - self.from[j];
-            s.q[j] = self.from[j] + d * share.clamp(0.0, 1.0);
+            s.q[j] = self.from[j] + d * within(share, 0.0, 1.0);
             s.v[j] = d * speed * rate;
         }
         s

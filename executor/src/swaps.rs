@@ -10,7 +10,8 @@ use rand_chacha::ChaCha8Rng;
 use crate::cycle::Order;
 use crate::guard::tests::pr2;
 use crate::testing::{HOME, MS, Sim, cubic, joining, plan};
-use crate::{Guard, JointVector, ValidPlan};
+use crate::{Guard, JointVector, ValidPlan, total};
+
 /// Swaps of the short form, and of the long one that is run by hand.
 const SHORT: u32 = 20_000;
 const LONG: u32 = 1_000_000;
@@ -39,7 +40,7 @@ fn walk(dice: &mut Dice, from: JointVector) -> Vec<(u64, JointVector)> {
         let step = 5 + dice.below(60);
         for j in 0..7 {
             // Back towards HOME on average, at most 1.2 rad/s.
-            let pull = 0.2 * (HOME[j] - q[j]).clamp(-1.0, 1.0);
+            let pull = 0.2 * total::limited(HOME[j] - q[j], 1.0);
             let speed = 1.0 * (2.0 * dice.unit() - 1.0) + pull;
             q[j] += speed * step as f64 * 1e-3;
         }

@@ -271,6 +271,7 @@ impl Sim {
             assert!(self.last.is_none(), "setpoints ceased");
             return;
         };
+        assert!(target.q[self.guard.dof..].iter().all(|q| *q == 0.0));
         for j in 0..self.guard.dof {
             let bound = self.guard.joints[j];
             assert!(target.q[j].is_finite() && target.v[j].is_finite());

@@ -12,7 +12,8 @@ use nullsweep_ipc_types::{
 };
 
 use crate::guard::Guard;
-use crate::interpolate::{PlanKnot, reach, top_speed};
+use crate::interpolate::{PlanKnot, reach, top_acceleration, top_speed};
+use crate::total::{greater, within};
 use crate::{JointVector, MAX_DOF};
 
 /// Plan times are whole nanoseconds in an `f64`. \[ns\]
@@ -377,8 +378,8 @@ fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
         .map(|pair| {
             let top = (0..guard.dof)
                 .map(|j| top_speed(&pair[0], &pair[1], plan.interpolation, j))
-                .fold(0.0, f64::max);
-            (guard.stop_acceleration / top).clamp(RAMP.0, RAMP.1)
+                .fold(0.0, greater);
+            within(guard.stop_acceleration / top, RAMP.0, RAMP.1)
         })
         .collect();
     // Indices of segments whose ramp is smaller than that of all before them in the window.

@@ -110,8 +110,13 @@ impl State {
     /// The state of a checkpoint; `None` where its bytes are no state.
     #[must_use]
     pub fn restore(saved: &Checkpoint) -> Option<Self> {
+        let mode = Mode::from_wire(saved.mode)?;
+        if matches!(mode, Mode::Executing | Mode::Paused | Mode::Stopping) {
+            // There was no plan.
+            return None;
+        }
         Some(Self {
-            mode: Mode::from_wire(saved.mode)?,
+            mode,
             fault: Fault::from_wire(saved.fault)?,
             cycle: saved.cycle,
             missed: saved.missed,

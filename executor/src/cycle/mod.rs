@@ -37,8 +37,8 @@ pub use state::{State, WAITING};
 /// One cycle. `now_ns` is the time of the wake-up on the clock of the states' stamps.
 pub fn step(state: &mut State, input: Input, now_ns: u64, guard: &Guard) -> Output {
     let mut out = Output::default();
-    state.cycle += 1;
-    state.missed += u64::from(input.missed);
+    state.cycle = state.cycle.wrapping_add(1);
+    state.missed = state.missed.saturating_add(u64::from(input.missed));
     state.supervise(input.measured, now_ns, guard, &mut out);
     if let Some(ask) = input.ask {
         state.obey(ask, now_ns, guard, &mut out);
@@ -47,22 +47,21 @@ pub fn step(state: &mut State, input: Input, now_ns: u64, guard: &Guard) -> Outp
         state.consider(plan, now_ns, guard, &mut out);
     }
     state.advance(guard, &mut out);
-    state.emit(guard, &mut out);
+    state.emit(&mut out);
     out
 }
 
 impl State {
     /// Makes the setpoint of this cycle and remembers it.
-    fn emit(&mut self, guard: &Guard, out: &mut Output) {
+    fn emit(&mut self, out: &mut Output) {
         if !self.has_position {
             return;
         }
-        self.sequence += 1;
+        self.sequence = self.sequence.wrapping_add(1);
         let slot = (self.sequence % REMEMBERED as u64) as usize;
         self.remembered[slot] = self.q;
         self.remembered_v[slot] = self.v;
         let snapshot = self.snapshot();
-        debug_assert!(self.q[guard.dof..].iter().all(|q| *q == 0.0));
         out.setpoint = Some(Target {
             sequence: self.sequence,
             q: self.q,

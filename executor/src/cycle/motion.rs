@@ -149,12 +149,14 @@ impl State {
                 return Err(Fault::NotFinite);
             }
             let step = (to - from).abs();
-            if step > bound.velocity() * guard.period() * (1.0 + STEP_SLACK.0) + STEP_SLACK.1 {
+            let most = bound.velocity() * guard.period() * (1.0 + STEP_SLACK.0) + STEP_SLACK.1;
+            if !(step <= most) {
                 return Err(Fault::Step);
             }
             // Coming back in from outside is allowed.
             let (lower, upper) = bound.limits_at(sample.v[j]);
-            if to < lower.min(from) - LIMIT_SLACK || to > upper.max(from) + LIMIT_SLACK {
+            let inside = to >= lower.min(from) - LIMIT_SLACK && to <= upper.max(from) + LIMIT_SLACK;
+            if !inside {
                 return Err(Fault::SoftLimit);
             }
         }

@@ -7,6 +7,7 @@ use super::state::{REMEMBERED, State, StopCause};
 use super::watch::Reaction;
 use crate::JointVector;
 use crate::guard::Guard;
+use crate::total::limited;
 
 /// How near commanded and measured positions must be for the arm to count as held. \[rad\]
 const HELD_WITHIN: f64 = 0.01;
@@ -130,8 +131,7 @@ impl State {
     /// Moves the commanded position towards a measured one, no faster than each joint may.
     fn creep(&mut self, to: &JointVector, guard: &Guard) {
         for (j, bound) in guard.used().iter().enumerate() {
-            let step = bound.velocity() * guard.period();
-            self.q[j] += (to[j] - self.q[j]).clamp(-step, step);
+            self.q[j] += limited(to[j] - self.q[j], bound.velocity() * guard.period());
         }
         self.v = JointVector::ZERO;
     }

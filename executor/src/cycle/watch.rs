@@ -48,11 +48,11 @@ impl Watch {
         if measured.joint_count != guard.dof {
             return Some(Fault::JointCount);
         }
-        if !measured.q[..guard.dof].iter().all(|q| q.is_finite()) {
+        if !measured.q.iter().take(guard.dof).all(|q| q.is_finite()) {
             return Some(Fault::NotFinite);
         }
         let mut own = measured;
-        own.q[guard.dof..].fill(0.0);
+        own.q.iter_mut().skip(guard.dof).for_each(|q| *q = 0.0);
         self.newest = Some(own);
         // A stamp from the future must not make a dead endpoint look alive.
         self.fresh_ns = measured.stamp_ns.min(now_ns);
@@ -87,17 +87,17 @@ impl Watch {
             self.window_start_ns = now_ns;
             return false;
         }
-        self.window_cycles += 1;
+        self.window_cycles = self.window_cycles.saturating_add(1);
         let elapsed = now_ns.saturating_sub(self.window_start_ns);
         if elapsed < RATE_WINDOW_NS {
             return false;
         }
         let slot = (self.windows % RATE_WINDOWS as u64) as usize;
         self.rates[slot] = f64::from(self.window_cycles) / (elapsed as f64 * 1e-9);
-        self.windows += 1;
+        self.windows = self.windows.wrapping_add(1);
         self.window_start_ns = now_ns;
         self.window_cycles = 0;
         let mean = self.rates.iter().sum::<f64>() / RATE_WINDOWS as f64;
-        self.windows >= RATE_WINDOWS as u64 && mean < guard.min_rate
+        self.windows >= RATE_WINDOWS as u64 && !(mean >= guard.min_rate)
     }
 }

@@ -201,4 +201,6 @@ fn put_plan(to: &mut Vec<u8>, plan: &ValidPlan) {
 }
 
 #[cfg(test)]
+mod forged;
+#[cfg(test)]
 mod tests;
