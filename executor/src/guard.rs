@@ -3,6 +3,10 @@
 
 use nullsweep_robot::{Continuous, JointLimits, JointVector, MAX_DOF};
 
+/// A joint that moves less than this to a plan's first knot stands: at no acceleration does it come
+/// to a speed that matters. \[rad\]
+const STILL: f64 = 1e-11;
+
 /// What one joint may do, as the robot crate reads it from the URDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointGuard {
@@ -64,6 +68,12 @@ pub struct Guard {
 impl Guard {
     /// Default of [`Self::start_tolerance`]. \[rad\]
     pub const START_TOLERANCE: f64 = 0.02;
+    /// How far from 0 a plan's joint may be, continuous ones too: some 160 turns. Further out whole
+    /// turns cannot be told from others to the last digits that the start tolerance needs.
+    /// \[rad\] or \[m\]
+    pub const FARTHEST: f64 = 1000.0;
+    /// The least share of its acceleration with which a joint is led to a first knot.
+    pub const APPROACH: f64 = 0.1;
 
     /// Guards these joints with the default parameters at a 1 kHz cycle. At most
     /// [`MAX_DOF`] joints are used.
@@ -125,11 +135,30 @@ impl Guard {
         self.connector_acceleration.min(self.joints[joint].limits.acceleration)
     }
 
-    /// How far two velocities may differ and still count as one: what the stop acceleration
-    /// changes in one cycle. \[rad/s\]
+    /// How far two velocities of a joint may differ and still count as one: what its acceleration
+    /// limit and the stop acceleration change in one cycle. \[rad/s\]
     #[must_use]
-    pub fn velocity_tolerance(&self) -> f64 {
-        self.stop_acceleration * self.period()
+    pub fn velocity_tolerance(&self, joint: usize) -> f64 {
+        self.stop_acceleration.min(self.joints[joint].limits.acceleration) * self.period()
+    }
+
+    /// The acceleration with which a joint of the motion from where the arm holds to a plan's first
+    /// knot keeps the braking margin: slower where the knot is near the soft limit ahead. `None`
+    /// where it would have to be slower than [`Self::APPROACH`] allows.
+    #[must_use]
+    pub fn approach(&self, joint: usize, from: f64, to: f64) -> Option<f64> {
+        let most = self.connector_acceleration(joint);
+        let limits = &self.joints[joint].limits;
+        let Some(k) = limits.k_position.filter(|_| !limits.continuous) else { return Some(most) };
+        let travel = (to - from).abs();
+        if travel <= STILL {
+            return Some(most);
+        }
+        // Braking with a towards a knot leaves a speed of √(2 a s) at a distance s from it. That is
+        // within k (s + room) at every s where a is at most 2 k² room.
+        let room = if to > from { limits.upper - to } else { to - limits.lower };
+        let slow = 2.0 * k * k * room;
+        if slow >= most { Some(most) } else { (slow >= Self::APPROACH * most).then_some(slow) }
     }
 
     /// Whether two velocities are one; else the first joint that differs, and by how much.
@@ -137,10 +166,9 @@ impl Guard {
     /// # Errors
     /// That joint and its difference. \[rad/s\]
     pub fn matches_velocity(&self, a: &JointVector, b: &JointVector) -> Result<(), (usize, f64)> {
-        let bound = self.velocity_tolerance();
         for j in 0..self.used().len() {
             let step = (b[j] - a[j]).abs();
-            if !(step <= bound) {
+            if !(step <= self.velocity_tolerance(j)) {
                 return Err((j, step));
             }
         }
@@ -161,7 +189,7 @@ impl Guard {
             if apart.is_nan() {
                 return Some((j, apart));
             }
-            if apart > worst.map_or(tolerance, |(_, d)| d) {
+            if !(apart <= worst.map_or(tolerance, |(_, d)| d)) {
                 worst = Some((j, apart));
             }
         }

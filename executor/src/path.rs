@@ -130,6 +130,17 @@ impl Path {
         Some(knot)
     }
 
+    /// The velocity with which a knot is reached at full rate: none in the first one, which the
+    /// connector leads to. \[rad/s\]
+    #[must_use]
+    pub fn speed_into(&self, knot: usize) -> JointVector {
+        let knots = self.plan.knots();
+        match (knot.checked_sub(1).and_then(|before| knots.get(before)), knots.get(knot)) {
+            (Some(a), Some(b)) => sample(a, b, self.plan.interpolation(), b.time).v,
+            _ => JointVector::ZERO,
+        }
+    }
+
     /// The last knot's place in this path.
     #[must_use]
     pub fn end(&self) -> JointVector {
@@ -212,7 +223,10 @@ impl Connector {
             farthest = farthest.max(d);
             if d > 0.0 {
                 speed = speed.min(bound.velocity() / d);
-                acceleration = acceleration.min(guard.connector_acceleration(j) / d);
+                // What may not come so near a soft limit was refused.
+                let most = guard.approach(j, from[j], to[j]);
+                let most = most.unwrap_or_else(|| guard.connector_acceleration(j));
+                acceleration = acceleration.min(most / d);
             }
         }
         if !(farthest > 0.0) || !(speed > 0.0) || !(acceleration > 0.0) {

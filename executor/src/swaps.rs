@@ -101,6 +101,7 @@ fn swap_at_random(seed: u64, swaps: u32) -> String {
     for joint in &mut guard.joints[..guard.dof] {
         joint.limits.lower = -10.0;
         joint.limits.upper = 10.0;
+        joint.limits.acceleration = 1e4;
     }
     let mut sim = Sim::holding(guard);
     let mut published: Vec<Arc<ValidPlan>> = Vec::new();

@@ -13,6 +13,7 @@ use nullsweep_ipc_types::{
 use crate::admit::{Held, Rules, ValidPlan, admit};
 use crate::cycle::{Ask, Event, Input, Measured, Order, Output, Reply, State, step};
 use crate::guard::Guard;
+use crate::guard::tests::pr2;
 use crate::{JointVector, MAX_DOF};
 
 pub(crate) const MS: u64 = 1_000_000;
@@ -36,6 +37,15 @@ pub(crate) fn held() -> Held {
     positions[0] = 0.2;
     positions[1] = 3.1;
     Held { positions, count: 2 }
+}
+
+/// The PR2's right arm, its joints as quick as they please: for curves through a few points.
+pub(crate) fn tireless() -> Guard {
+    let mut guard = pr2();
+    for joint in &mut guard.joints {
+        joint.limits.acceleration = 1e4;
+    }
+    guard
 }
 
 /// A sealed message that passes admission: knots of (time, positions).
@@ -185,6 +195,14 @@ impl Sim {
         sim.run(3);
         assert_eq!(sim.mode(), Mode::Hold);
         sim
+    }
+
+    /// Puts an arm that has not begun yet somewhere, and lets the executor hold it there.
+    pub(crate) fn stand_at(&mut self, q: JointVector) {
+        self.arm = q;
+        self.pipe = [(0, q); 2];
+        self.run(3);
+        assert_eq!((self.mode(), self.last), (Mode::Hold, Some(q)));
     }
 
     pub(crate) fn mode(&self) -> Mode {

@@ -78,7 +78,8 @@ wire_enum! {
 pub struct Knot {
     /// Time since the plan's start. \[ns\]
     pub time_from_start_ns: u64,
-    /// Joint positions; continuous joints are unwrapped along the whole plan. \[rad\] or \[m\]
+    /// Joint positions; continuous joints are unwrapped along the whole plan, and none is further
+    /// from 0 than 1000. \[rad\] or \[m\]
     pub positions: JointArray,
     /// Joint velocities, used by [`Interpolation::Cubic`], else zero. \[rad/s\] or \[m/s\]
     pub velocities: JointArray,

@@ -1,7 +1,7 @@
 //! Planner and executor move the arm between two knots by code of their own. Here both follow the
 //! same random plans: what the planner has verified is what the executor commands.
 
-use nullsweep_executor::{JointVector, PlanKnot, reach, sample, top_speed};
+use nullsweep_executor::{JointVector, PlanKnot, reach, sample, top_acceleration, top_speed};
 use nullsweep_ipc_types::Interpolation;
 use nullsweep_planner::plan::{self, CostKind, FORMAT, Method, Plan, Profile};
 use nullsweep_robot::{MAX_DOF, Tool};
@@ -9,6 +9,9 @@ use proptest::prelude::*;
 
 /// What positions may differ by; the most that was seen is 5.3e-15. \[rad\]
 const POSITION: f64 = 2e-14;
+/// What accelerations may differ by, as a share of the terms that they are the difference of; both
+/// gates allow 1e-6 of the limit.
+const ACCELERATION: f64 = 1e-14;
 /// What velocities may differ by, as a share of the segment's greatest speed; seen: 2.6e-15.
 const VELOCITY: f64 = 1e-14;
 
@@ -111,7 +114,7 @@ proptest! {
 
     /// What the planner's check and the executor's guard judge a segment by.
     #[test]
-    fn planner_and_executor_agree_on_a_segments_speed_and_range(
+    fn planner_and_executor_agree_on_a_segments_speed_acceleration_and_range(
         cubic in any::<bool>(),
         ends in prop::array::uniform2(joints()),
         length in 1_000_000..=2_000_000_000u64,
@@ -123,6 +126,11 @@ proptest! {
         for j in 0..MAX_DOF {
             let (own, theirs) = (curve.top_speed(j), top_speed(&knots[0], &knots[1], kind, j));
             prop_assert!((own - theirs).abs() <= VELOCITY * own, "{own} and {theirs}");
+            let (own, theirs) =
+                (curve.top_acceleration(j), top_acceleration(&knots[0], &knots[1], kind, j));
+            let (a, b, seconds) = (&knots[0], &knots[1], curve.seconds());
+            let terms = ((b.q[j] - a.q[j]).abs() / seconds + a.v[j].abs() + b.v[j].abs()) / seconds;
+            prop_assert!((own - theirs).abs() <= 20.0 * ACCELERATION * terms, "{own} and {theirs}");
             let (own, theirs) = (curve.range(j), reach(&knots[0], &knots[1], kind, j));
             let off = (own.0 - theirs.0).abs().max((own.1 - theirs.1).abs());
             prop_assert!(off <= POSITION, "{own:?} and {theirs:?}");

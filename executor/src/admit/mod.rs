@@ -20,6 +20,8 @@ use crate::{JointVector, MAX_DOF};
 const LONGEST_NS: u64 = 1 << 53;
 /// A planner rounds its times to whole nanoseconds, so a segment may be this much too short. \[s\]
 const ROUNDING_S: f64 = 1e-9;
+/// What a planner's acceleration may exceed its limit by, as a share of it.
+const ROUNDING_SHARE: f64 = 1e-6;
 /// Room for the rounding of positions. \[rad\]
 const SLACK: f64 = 1e-9;
 /// The rate of plan time never changes faster than from 0 to 1 in 20 ms, nor slower than in 1 s.
@@ -207,7 +209,7 @@ impl Rules {
 ///
 /// # Errors
 /// The first rule that it breaks, in this order: counts and enum values, checksum, epoch, robot,
-/// held joints, finite values, time order, soft limits and velocity, rest at the end.
+/// held joints, finite values, time order, soft limits, velocity and acceleration, rest at the end.
 pub fn admit(
     header: &PlanHeader,
     knots: &[Knot],
@@ -311,6 +313,11 @@ fn read(knots: &[Knot], joints: usize) -> Result<Vec<PlanKnot>, Rejection> {
                 }
                 *to = from;
             }
+            // A bound that holds also for joints that turn without end.
+            if !(own.q[j].abs() <= Guard::FARTHEST) {
+                let far = Rejection::new(Reason::SoftLimit).knot(i).joint(j);
+                return Err(far.value(own.q[j], Guard::FARTHEST.copysign(own.q[j])));
+            }
         }
         let order = Rejection::new(Reason::TimeOrder).knot(i);
         match read.last() {
@@ -325,7 +332,8 @@ fn read(knots: &[Knot], joints: usize) -> Result<Vec<PlanKnot>, Rejection> {
     Ok(read)
 }
 
-/// Soft limits with the braking margin at each segment's speed, and velocity limits.
+/// Soft limits with the braking margin at each segment's speed, velocity limits, and acceleration
+/// limits within curves. A straight segment's corners are bang-bang, and that is allowed.
 fn check_motion(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
     for (i, pair) in plan.knots.windows(2).enumerate() {
         let (a, b) = (&pair[0], &pair[1]);
@@ -335,19 +343,21 @@ fn check_motion(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
             let fits = speed * seconds <= bound.velocity() * (seconds + ROUNDING_S) + SLACK;
             let (low, high) = reach(a, b, plan.interpolation, j);
             let (lower, upper) = bound.limits_at(speed);
-            let soft = Rejection::new(Reason::SoftLimit).knot(i + 1).joint(j);
+            let at = |reason| Rejection::new(reason).knot(i + 1).joint(j);
             // Written so that NaN breaks every rule.
             if !(low >= lower - SLACK) {
-                return Err(soft.value(low, lower));
+                return Err(at(Reason::SoftLimit).value(low, lower));
             }
             if !(high <= upper + SLACK) {
-                return Err(soft.value(high, upper));
+                return Err(at(Reason::SoftLimit).value(high, upper));
             }
             if !fits {
-                return Err(Rejection::new(Reason::Velocity)
-                    .knot(i + 1)
-                    .joint(j)
-                    .value(speed, bound.velocity()));
+                return Err(at(Reason::Velocity).value(speed, bound.velocity()));
+            }
+            let (hardest, most) =
+                (top_acceleration(a, b, plan.interpolation, j), bound.limits.acceleration);
+            if !(hardest <= most * (1.0 + ROUNDING_SHARE) + SLACK) {
+                return Err(at(Reason::Acceleration).value(hardest, most));
             }
         }
     }
@@ -364,7 +374,7 @@ fn check_end(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
         Rejection::new(Reason::Velocity)
             .knot(plan.knots.len() - 1)
             .joint(joint)
-            .value(speed, guard.velocity_tolerance())
+            .value(speed, guard.velocity_tolerance(joint))
     })
 }
 

@@ -4,7 +4,9 @@ use nullsweep_ipc_types::{Interpolation, JoinRule, Knot, MAX_KNOTS, PlanHeader, 
 use proptest::prelude::*;
 
 use super::{Held, Join, Rejection, ValidPlan, admit};
+use crate::guard::Guard;
 use crate::guard::tests::pr2;
+use crate::interpolate::{reach, top_speed};
 use crate::testing::{HOME, MS, held, message, moved, rules, seal};
 
 const NOW: u64 = 5000;
@@ -19,6 +21,14 @@ fn good() -> (PlanHeader, Vec<Knot>) {
 
 fn judge(header: &PlanHeader, knots: &[Knot], held: Option<&Held>) -> Result<ValidPlan, Rejection> {
     admit(header, knots, held, &rules(&pr2()), NOW)
+}
+
+/// Rest to rest from knot to knot, a second each.
+fn gentle_curve(header: &mut PlanHeader, knots: &mut [Knot]) {
+    header.interpolation = Interpolation::Cubic.wire();
+    for knot in knots {
+        knot.time_from_start_ns *= 20;
+    }
 }
 
 /// What is changed, the reason, the joint, the knot.
@@ -70,12 +80,58 @@ const SEALED: &[Case] = &[
     (
         "cubic that does not come to rest",
         |h, k| {
-            h.interpolation = Interpolation::Cubic.wire();
+            gentle_curve(h, k);
             k[4].velocities[2] = 0.02;
         },
         Reason::Velocity,
         Some(2),
         Some(4),
+    ),
+    // Every sum in such a curve is infinite or no number.
+    (
+        "a speed beyond all numbers",
+        |h, k| {
+            gentle_curve(h, k);
+            k[2].velocities[4] = 1.79e308;
+        },
+        Reason::Velocity,
+        Some(4),
+        Some(2),
+    ),
+    (
+        "a speed whose square is beyond all numbers",
+        |h, k| {
+            gentle_curve(h, k);
+            k[2].velocities[4] = -1e200;
+        },
+        Reason::Velocity,
+        Some(4),
+        Some(2),
+    ),
+    (
+        "far",
+        |_, k| k.iter_mut().for_each(|k| k.positions[6] = 1e15),
+        Reason::SoftLimit,
+        Some(6),
+        Some(0),
+    ),
+    (
+        "too many turns",
+        |_, k| k.iter_mut().for_each(|k| k.positions[4] = -1001.0),
+        Reason::SoftLimit,
+        Some(4),
+        Some(0),
+    ),
+    // 6 d / t² = 4.2 rad/s² of 4.
+    (
+        "acceleration",
+        |h, k| {
+            gentle_curve(h, k);
+            k[3].positions[0] = k[2].positions[0] + 0.7;
+        },
+        Reason::Acceleration,
+        Some(0),
+        Some(3),
     ),
     // Both knots are inside, but the curve swings out between them.
     (
@@ -146,6 +202,63 @@ fn the_braking_margin_grows_with_speed() {
         let (header, knots) = message(1, &[(0, from), ((0.1 / speed * 1e9) as u64, to)]);
         let result = judge(&header, &knots, Some(&held()));
         assert_eq!(result.is_ok(), fits, "{speed} rad/s, {distance} rad: {result:?}");
+    }
+}
+
+/// What keeps every limit to within rounding is admitted: rest to rest with the joint's own
+/// acceleration, and a share of 10⁻⁶ more. A straight line has no such bound.
+#[test]
+fn acceleration_is_bounded_in_curves_to_within_rounding() {
+    let guard = pr2();
+    for j in 0..7 {
+        let most = guard.joints[j].limits.acceleration;
+        for (share, fits) in [(0.5, true), (1.0, true), (1.0 + 9e-7, true), (1.0 + 2e-6, false)] {
+            let by = most * share * 0.25 / 6.0;
+            let points = [(0, HOME), (500 * MS, moved(HOME, j, by)), (1_000 * MS, HOME)];
+            for kind in [Interpolation::Cubic, Interpolation::Linear] {
+                let (mut header, knots) = message(1, &points);
+                header.interpolation = kind.wire();
+                seal(&mut header, &knots);
+                let found = judge(&header, &knots, Some(&held())).map_err(|why| why.reason);
+                if fits || kind == Interpolation::Linear {
+                    assert_eq!(found.map(|_| ()), Ok(()), "joint {j}, {share}");
+                } else {
+                    assert_eq!(found.unwrap_err(), Reason::Acceleration, "joint {j}, {share}");
+                }
+            }
+        }
+    }
+}
+
+/// Whatever stands for a number: refused, or every figure of the plan is a bounded one.
+#[test]
+fn no_number_passes_a_bound_that_it_does_not_keep() {
+    let odd = [f64::MAX, f64::MIN, 1.79e308, -1e300, 1e200, -1e154, 1e100, 1e15, f64::MIN_POSITIVE];
+    let guard = pr2();
+    for kind in Interpolation::ALL {
+        for (place, odd) in (0..2 * 7 * 5).flat_map(|place| odd.map(|odd| (place, odd))) {
+            let (mut header, mut knots) = good();
+            gentle_curve(&mut header, &mut knots);
+            header.interpolation = kind.wire();
+            let knot = &mut knots[place % 5];
+            let joint = place / 5 % 7;
+            let moves = place >= 35;
+            if moves {
+                knot.positions[joint] = odd;
+            } else {
+                knot.velocities[joint] = odd;
+            }
+            seal(&mut header, &knots);
+            let Ok(plan) = judge(&header, &knots, Some(&held())) else { continue };
+            for pair in plan.knots().windows(2) {
+                for j in 0..7 {
+                    let speed = top_speed(&pair[0], &pair[1], *kind, j);
+                    assert!(speed <= guard.joints[j].velocity(), "{kind}, joint {joint}: {odd}");
+                    let (low, high) = reach(&pair[0], &pair[1], *kind, j);
+                    assert!(low >= -Guard::FARTHEST && high <= Guard::FARTHEST, "{kind}: {odd}");
+                }
+            }
+        }
     }
 }
 

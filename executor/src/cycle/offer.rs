@@ -10,10 +10,11 @@ use nullsweep_ipc_types::{EventKind, Fault, Interpolation, Mode, PlanId, Reason}
 
 use super::exchange::Output;
 use super::state::{State, StopCause, Turn, Waiting};
+use crate::JointVector;
 use crate::admit::{Join, Rejection, ValidPlan};
 use crate::guard::Guard;
+use crate::interpolate::sample;
 use crate::path::Path;
-use crate::{JointVector, MAX_DOF};
 
 impl State {
     /// Accepts or rejects a plan, with exactly one event for it.
@@ -80,11 +81,18 @@ impl State {
         if let Some((joint, apart)) = guard.farthest(holds, &first.q, guard.start_tolerance) {
             return Err(start.joint(joint).value(apart, guard.start_tolerance));
         }
+        // The way there must keep the braking margin. Whole turns are only of joints without one.
+        for j in 0..guard.used().len() {
+            if guard.approach(j, holds[j], first.q[j]).is_none() {
+                let (lower, upper) = guard.joints[j].limits_at(0.0);
+                let ahead = if first.q[j] > holds[j] { upper } else { lower };
+                let near = Rejection::new(Reason::SoftLimit).knot(0).joint(j);
+                return Err(near.value(first.q[j], ahead));
+            }
+        }
         // A curve that is already under way at its first knot cannot start from a stand-still.
         if plan.interpolation() == Interpolation::Cubic {
-            return guard.matches_velocity(&JointVector::new([0.0; MAX_DOF]), &first.v).map_err(
-                |(joint, step)| start.joint(joint).value(step, guard.velocity_tolerance()),
-            );
+            return meet(&JointVector::ZERO, &first.v, guard);
         }
         Ok(())
     }
@@ -150,11 +158,34 @@ impl State {
         if let Some((joint, apart)) = guard.farthest(&at.q, &first.q, guard.join_tolerance) {
             return Err(start.joint(joint).value(apart, guard.join_tolerance));
         }
-        // Curves that carry velocities must also meet in them.
-        let curves = [plan, path.plan()].iter().all(|p| p.interpolation() == Interpolation::Cubic);
-        if curves && let Err((joint, step)) = guard.matches_velocity(&at.v, &first.v) {
-            return Err(start.joint(joint).value(step, guard.velocity_tolerance()));
+        let (before, after) = (path.speed_into(knot), speed_from(plan));
+        let curved = |p: &ValidPlan| p.interpolation() == Interpolation::Cubic;
+        match (curved(path.plan()), curved(plan)) {
+            // A corner as bang-bang plans have them.
+            (false, false) => Ok(()),
+            (true, true) => meet(&before, &after, guard),
+            // A bang-bang plan also begins and ends at speed where the arm stands.
+            (true, false) => meet(&before, &after, guard)
+                .or_else(|why| meet(&before, &JointVector::ZERO, guard).map_err(|_| why)),
+            (false, true) => meet(&before, &after, guard)
+                .or_else(|why| meet(&JointVector::ZERO, &after, guard).map_err(|_| why)),
         }
-        Ok(())
     }
+}
+
+/// The velocity with which a plan leaves its first knot. \[rad/s\]
+fn speed_from(plan: &ValidPlan) -> JointVector {
+    match plan.knots() {
+        [a, b, ..] => sample(a, b, plan.interpolation(), a.time).v,
+        _ => JointVector::ZERO,
+    }
+}
+
+/// Whether a motion can go over into another one: velocities differ by no more than each joint may
+/// change in a cycle.
+fn meet(before: &JointVector, after: &JointVector, guard: &Guard) -> Result<(), Rejection> {
+    guard.matches_velocity(before, after).map_err(|(joint, step)| {
+        let bound = guard.velocity_tolerance(joint);
+        Rejection::new(Reason::Start).knot(0).joint(joint).value(step, bound)
+    })
 }

@@ -106,7 +106,8 @@ impl State {
             .or(self.watch.endpoint().map(|(fault, _)| fault))
             .or(stale.then_some(Fault::StaleState));
         self.fault = trouble.unwrap_or(Fault::None);
-        let near = (0..guard.dof).all(|j| (self.q[j] - measured.q[j]).abs() <= HELD_WITHIN);
+        let near =
+            (0..guard.used().len()).all(|j| (self.q[j] - measured.q[j]).abs() <= HELD_WITHIN);
         if trouble.is_none() && near {
             self.mode = Mode::Hold;
             self.forget();
@@ -168,7 +169,7 @@ impl State {
         }
         let newest = self.watch.newest?;
         let slot = (newest.setpoint_sequence % REMEMBERED as u64) as usize;
-        let far = (0..guard.dof).any(|j| {
+        let far = (0..guard.used().len()).any(|j| {
             let speed = self.remembered_v[slot][j].abs();
             let error = (self.remembered[slot][j] - newest.q[j]).abs();
             !(error <= guard.following_error + guard.following_lag * speed)

@@ -1,6 +1,7 @@
 //! States and events, the join rules, and supervision, on a virtual clock.
 
 mod faults;
+mod joins;
 mod motion;
 mod tables;
 
@@ -12,7 +13,7 @@ use nullsweep_ipc_types::{
 use crate::JointVector;
 use crate::cycle::{Event, Measured, Order};
 use crate::guard::tests::pr2;
-use crate::testing::{HOME, MS, Sim, cubic, joining, moved, plan, plan_with};
+use crate::testing::{HOME, MS, Sim, cubic, joining, moved, plan, plan_with, tireless};
 
 fn id(number: u64) -> PlanId {
     PlanId { epoch: 1000, number }

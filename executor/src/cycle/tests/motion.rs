@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn runs_a_plan_to_its_exact_end() {
     for kind in ["linear", "cubic"] {
-        let mut sim = Sim::holding(pr2());
+        let mut sim = Sim::holding(tireless());
         let guard = sim.guard;
         let points = line(HOME);
         let plan = if kind == "cubic" {
@@ -29,7 +29,7 @@ fn runs_a_plan_to_its_exact_end() {
 
 #[test]
 fn a_connector_leads_to_the_first_knot() {
-    let mut sim = Sim::holding(pr2());
+    let mut sim = Sim::holding(tireless());
     let guard = sim.guard;
     let from = moved(moved(HOME, 0, 0.015), 5, -0.01);
     sim.offer(cubic(&guard, 1, &line(from)));
@@ -114,7 +114,7 @@ fn a_join_that_does_not_fit_leaves_the_plan_alone() {
 
 #[test]
 fn curves_must_meet_in_velocity_too() {
-    let mut sim = Sim::holding(pr2());
+    let mut sim = Sim::holding(tireless());
     let guard = sim.guard;
     let points = line(HOME);
     // Under way from the first knot on: not from a stand-still.

@@ -1,0 +1,151 @@
+//! Where one motion goes over into another one: no step that no limit allows, no plan that is
+//! accepted and then cannot be reached.
+
+use super::*;
+use crate::Guard;
+use crate::admit::ValidPlan;
+
+/// Joint 0 out and back in a sine, within 4 rad/s²: knots each 50 ms, moving at most.
+fn sine(guard: &Guard, number: u64) -> std::sync::Arc<ValidPlan> {
+    let turn = core::f64::consts::TAU / 2.4;
+    let points: Vec<_> = (0..=48u32)
+        .map(|k| {
+            let t = 0.05 * f64::from(k);
+            (u64::from(k) * 50 * MS, moved(HOME, 0, 0.25 * (1.0 - (turn * t).cos())))
+        })
+        .collect();
+    plan_with(guard, number, &points, |h, knots| {
+        h.interpolation = Interpolation::Cubic.wire();
+        for knot in knots {
+            let t = knot.time_from_start_ns as f64 * 1e-9;
+            knot.velocities[0] = 0.25 * turn * (turn * t).sin();
+        }
+    })
+}
+
+/// A bang-bang plan from `from` with joint 0 at `speed`.
+fn straight(
+    guard: &Guard,
+    number: u64,
+    from: JointVector,
+    speed: f64,
+    at: usize,
+) -> std::sync::Arc<ValidPlan> {
+    let points = [(0, from), (200 * MS, moved(from, 0, 0.2 * speed))];
+    joining(guard, number, &points, id(1), at)
+}
+
+/// A plan with limited acceleration is not left with a step that no acceleration makes, and a
+/// bang-bang plan keeps its own corners.
+#[test]
+fn a_join_makes_no_step_that_a_curve_may_not() {
+    let guard = pr2();
+    let mut sim = Sim::holding(guard);
+    let curve = sine(&guard, 1);
+    only(&sim.offer(curve.clone()), Accepted);
+    sim.run(100);
+    // Knot 12 is in the middle of the way out, knot 36 of the way back, at 0.65 rad/s.
+    let fast = |knot: usize| curve.knots()[knot];
+    assert!(fast(12).v[0] > 0.65 && fast(36).v[0] < -0.65);
+    let cases = [
+        (12, -fast(12).v[0], false),
+        (12, 0.0, false),
+        (36, -fast(36).v[0], false),
+        (12, fast(12).v[0] + 0.005, false),
+        (12, fast(12).v[0] + 0.003, true),
+    ];
+    for (number, (at, speed, fits)) in cases.into_iter().enumerate() {
+        let number = number as u64 + 2;
+        let events = sim.offer(straight(&guard, number, fast(at).q, speed, at));
+        if fits {
+            only(&events, Accepted);
+        } else {
+            let why = only(&events, Rejected).why;
+            assert_eq!((why.reason, why.joint), (Reason::Start, 0), "{speed} at knot {at}");
+            assert!(why.value > why.bound && why.bound <= 0.004 + 1e-12, "{why}");
+        }
+    }
+    sim.top_acceleration = 0.0;
+    sim.run_until(Mode::Hold, 2000);
+    assert_eq!(sim.story(6), [Accepted, Started, Finished]);
+}
+
+/// From where the arm stands a bang-bang plan begins at speed, as it does from Hold; and a curve
+/// that begins at rest may follow a bang-bang plan.
+#[test]
+fn bang_bang_begins_and_ends_where_the_arm_stands() {
+    let guard = tireless();
+    let points = line(HOME);
+    for curve_first in [true, false] {
+        let mut sim = Sim::holding(guard);
+        let at_rest = |number, points: &[(u64, JointVector)], at: Option<usize>| {
+            plan_with(&guard, number, points, |h, _| {
+                h.interpolation = Interpolation::Cubic.wire();
+                if let Some(knot) = at {
+                    h.join_rule = JoinRule::AtKnot.wire();
+                    (h.join_plan, h.join_knot) = (id(1), knot as u32);
+                }
+            })
+        };
+        let next = line(points[4].1);
+        if curve_first {
+            only(&sim.offer(at_rest(1, &points, None)), Accepted);
+            only(&sim.offer(joining(&guard, 2, &next, id(1), 4)), Accepted);
+        } else {
+            only(&sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &points)), Accepted);
+            only(&sim.offer(at_rest(2, &next, Some(4))), Accepted);
+        }
+        sim.run_until(Mode::Hold, 2000);
+        assert_eq!(sim.story(1), [Accepted, Started, Superseded]);
+        assert_eq!(sim.story(2), [Accepted, Started, Finished]);
+    }
+}
+
+/// A first knot at a soft limit while the arm holds a little further inside: what the way there
+/// could not keep the braking margin on is refused, everything else arrives.
+#[test]
+fn a_first_knot_near_a_soft_limit_is_reached_or_refused() {
+    let guard = pr2();
+    let mut seen = [0; 2];
+    for joint in [0, 1, 2, 3, 5] {
+        let (lower, upper) = guard.joints[joint].limits_at(0.0);
+        for (limit, inwards) in [(upper, -1.0), (lower, 1.0)] {
+            for room in [0.0, 1e-7, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 2.4e-3, 3e-3, 0.01] {
+                for apart in [0.0, 1e-13, 1e-9, 1e-6, 1e-4, 1e-3, 0.01, 0.0199] {
+                    for other in [0.0, 0.015] {
+                        let mut first = HOME;
+                        first[joint] = limit + inwards * room;
+                        let holds = moved(first, joint, inwards * apart);
+                        let holds = moved(holds, 6, other);
+                        let mut sim = Sim::new(guard);
+                        sim.stand_at(holds);
+                        // Inwards, so slowly that the plan itself needs no margin there.
+                        let then = moved(first, joint, inwards * 1e-9);
+                        let points = [(0, first), (100 * MS, then)];
+                        let event = sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &points));
+                        let what = format!("joint {joint}, room {room}, {apart} apart");
+                        if event[0].kind == Rejected {
+                            let why = event[0].why;
+                            assert_eq!(why.reason, Reason::SoftLimit, "{what}");
+                            assert_eq!((why.joint, why.knot), (joint as u32, 0), "{what}");
+                            assert!(room < 3e-4 && apart > 1e-11, "{what}");
+                            seen[0] += 1;
+                            continue;
+                        }
+                        seen[1] += 1;
+                        for _ in 0..3000 {
+                            if sim.mode() != Mode::Executing {
+                                break;
+                            }
+                            sim.run(1);
+                        }
+                        let fault = sim.state.snapshot().fault;
+                        assert_eq!((sim.mode(), fault), (Mode::Hold, Fault::None), "{what}");
+                        assert_eq!(sim.story(1), [Accepted, Started, Finished], "{what}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(seen[0] > 100 && seen[1] > 500, "{seen:?}");
+}
