@@ -1,6 +1,7 @@
 //! URDFs that are refused, and what becomes of those that are not.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Vector3};
 use nullsweep_robot::{
@@ -40,6 +41,32 @@ fn files_that_are_no_robot() {
         assert!(matches!(error, UrdfError::Parse { .. } | UrdfError::Empty), "{text}: {error}");
     }
     assert!(matches!(Robot::from_urdf_str("<robot name='r'/>"), Err(UrdfError::Empty)));
+}
+
+/// Depth costs the reader stack, and time that grows with its square.
+#[test]
+fn deep_nesting_is_refused_at_once() {
+    let nested = |depth: usize| {
+        let (open, close) = ("<x>".repeat(depth), "</x>".repeat(depth));
+        format!("<robot name='r'><link name='a'/>{open}{close}</robot>")
+    };
+    let start = Instant::now();
+    for depth in [128, 20_000, 300_000] {
+        let error = Robot::from_urdf_str(&nested(depth)).unwrap_err().to_string();
+        let place = 32 + 3 * 128;
+        let expected = format!("<x> near byte {place} is nested more than 128 deep");
+        assert!(error.contains(&expected), "{error}");
+    }
+    assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
+    Robot::from_urdf_str(&nested(127)).unwrap();
+    // The same behind an entity, which the reader expands.
+    let open = "<x>".repeat(20_000);
+    let hidden = format!(
+        "<!DOCTYPE robot [<!ENTITY e \"{open}{}\">]><robot name='r'><link name='a'/>&e;</robot>",
+        "</x>".repeat(20_000)
+    );
+    let error = Robot::from_urdf_str(&hidden).unwrap_err().to_string();
+    assert!(error.contains("entities are declared"), "{error}");
 }
 
 #[test]

@@ -10,6 +10,11 @@ use quick_xml::Reader;
 use quick_xml::escape::unescape;
 use quick_xml::events::{BytesStart, Event};
 
+/// How deep elements may be nested. A URDF's own elements go 6 deep and the plugins that are put into
+/// it hardly deeper than 12; `urdf-rs` reads elements by recursion, and time that grows with the
+/// square of the depth.
+const DEPTH: usize = 128;
+
 /// What the text of one `<joint>` holds.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct JointFacts {
@@ -42,10 +47,20 @@ pub(crate) fn joint_facts(text: &str) -> Result<HashMap<String, JointFacts>, Str
                 path.pop();
                 continue;
             }
+            // What an entity stands for is read by `urdf-rs` alone, and may be as deep as you like.
+            Event::DocType(text) if text.contains("<!ENTITY") => {
+                return Err("entities are declared: write out what they stand for".into());
+            }
             Event::Eof => return Ok(facts),
             _ => continue,
         };
         let name = element.name().as_ref().to_owned();
+        if path.len() >= DEPTH {
+            return Err(format!(
+                "<{name}> near byte {} is nested more than {DEPTH} deep: no robot's description is",
+                reader.buffer_position()
+            ));
+        }
         let parent = path.last().map(String::as_str);
         if path.len() == 1 && name == "joint" {
             current = attribute(element, "name")?.unwrap_or_default();
