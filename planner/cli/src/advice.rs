@@ -107,6 +107,10 @@ fn publish(error: &PublishError) -> Option<String> {
             "make the plan with `planner plan --continue PLAN@K`, or publish it with --join stop"
         }
         PublishError::NothingRuns => "`planner publish --join stop` sends a plan to an idle arm",
+        PublishError::Lost(_) => {
+            "see the executor's last lines for why; it starts no plan from before its own start, so \
+             publish again, or `planner replan`, once `executor ctl status` answers"
+        }
         PublishError::Plan(error) => return plan(error),
         _ => return None,
     };

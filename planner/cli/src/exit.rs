@@ -1,5 +1,8 @@
 //! Exit codes.
 
+use nullsweep_planner::link::publish::PublishError;
+use nullsweep_planner::link::replan::ReplanError;
+
 /// Everything went well.
 pub const OK: u8 = 0;
 /// Bad input, no plan, no executor, a rejection.
@@ -8,3 +11,34 @@ pub const FAILED: u8 = 1;
 pub const USAGE: u8 = 2;
 /// A plan was made but breaks a rule, so it was not written.
 pub const VIOLATIONS: u8 = 3;
+/// The executor was lost while its answer or a plan's end was waited for.
+pub const LOST: u8 = 4;
+
+/// The exit code of a command that failed.
+pub(super) fn of(error: &anyhow::Error) -> u8 {
+    let lost = error.chain().any(|cause| {
+        let publish = match cause.downcast_ref() {
+            Some(ReplanError::Publish(error)) => Some(error),
+            _ => cause.downcast_ref(),
+        };
+        matches!(publish, Some(PublishError::Lost(_)))
+    });
+    if lost { LOST } else { FAILED }
+}
+
+#[cfg(test)]
+mod tests {
+    use nullsweep_planner::link::{Loss, Lost};
+
+    use super::*;
+
+    #[test]
+    fn a_lost_executor_has_a_code_of_its_own() {
+        let lost = || PublishError::Lost(Box::new(Lost { loss: Loss::Ended, last: None }));
+        assert_eq!(of(&lost().into()), LOST);
+        assert_eq!(of(&ReplanError::from(lost()).into()), LOST);
+        assert_eq!(of(&anyhow::Error::from(lost()).context("while publishing")), LOST);
+        assert_eq!(of(&PublishError::NoTelemetry.into()), FAILED);
+        assert_eq!(of(&ReplanError::from(PublishError::NoTelemetry).into()), FAILED);
+    }
+}

@@ -18,7 +18,7 @@ mod scene;
 mod task;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
-pub use exit::{FAILED, OK, USAGE, VIOLATIONS};
+pub use exit::{FAILED, LOST, OK, USAGE, VIOLATIONS};
 pub use picture::{joint_axes, motion};
 
 use std::ffi::OsString;
@@ -31,7 +31,7 @@ use clap::{Parser, Subcommand};
 #[command(
     name = "planner",
     version,
-    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule and was not written."
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule and was not written; 4 the executor was lost while it was waited for."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -86,7 +86,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
             if let Some(advice) = advice::advice(&e) {
                 eprintln!("help: {advice}");
             }
-            ExitCode::from(FAILED)
+            ExitCode::from(exit::of(&e))
         }
     }
 }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError};
 use nullsweep_ipc_types::{EventKind, JoinRule, PlanEvent, PlanId, Reason, Telemetry};
 
+use crate::link::pulse::{Lost, Pulse};
 use crate::plan::{Plan, PlanError};
 
 /// How a plan joins what is going on, as it is asked for on the command line.
@@ -58,16 +59,21 @@ pub enum PublishError {
     /// It did not end in time.
     #[error("the plan has not ended within {0:?}")]
     NoEnd(Duration),
+    /// The executor was lost before it told what was waited for.
+    #[error("{0}")]
+    Lost(Box<Lost>),
     /// It was ended early.
     #[error("ended early: {}", describe(.0))]
     EndedEarly(Box<PlanEvent>),
 }
 
 /// Publishes the plan to `robot`'s executor and waits for its admission and, if asked, its end.
-/// `seen` is called with every event of this plan. Returns the plan's id.
+/// `seen` is called with every event of this plan. Returns the plan's id. An executor that dies
+/// meanwhile is noticed within a second.
 ///
 /// # Errors
-/// No executor, a rejection with its reason, or an early end: see [`PublishError`].
+/// No executor, a rejection with its reason, an early end, or an executor that was lost: see
+/// [`PublishError`].
 pub fn publish(
     plan: &Plan,
     robot: &str,
@@ -95,6 +101,7 @@ pub fn publish(
     }
     .wire();
     while events.receive()?.is_some() {} // Older plans' events.
+    let mut pulse = Pulse::open(&ipc);
     let id = publisher.publish(&header, &knots)?;
 
     let mut wait = |limit: Duration, wanted: fn(EventKind) -> bool| {
@@ -107,6 +114,9 @@ pub fn publish(
                         return Ok::<_, PublishError>(Some(event));
                     }
                 }
+            }
+            if let Some(lost) = pulse.look()? {
+                return Err(PublishError::Lost(Box::new(lost)));
             }
             std::thread::sleep(Duration::from_millis(2));
         }

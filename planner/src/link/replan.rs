@@ -12,6 +12,7 @@ use nullsweep_ipc_types::{
 use nullsweep_robot::{JointVector, MAX_DOF};
 
 use crate::link::publish::{Join, Patience, PublishError, newest_telemetry, publish};
+use crate::link::pulse::Pulse;
 use crate::plan::Plan;
 
 /// How far the arm may be commanded from the plan that it is said to run: cubic segments leave the
@@ -182,6 +183,7 @@ fn is_late(why: &PlanEvent) -> bool {
 /// before its stop could be watched: it was passed by then.
 fn stop(ipc: &Ipc, old: PlanId, knot: usize, patience: Duration) -> Result<Start, ReplanError> {
     let telemetry = ipc.telemetry_receiver()?;
+    let mut pulse = Pulse::open(ipc);
     let mut passed = None;
     let mut newest = look(&telemetry, old, &mut passed)?;
     let answer = ipc.command_client()?.call(CommandKind::Stop, 0.0, patience)?;
@@ -198,6 +200,9 @@ fn stop(ipc: &Ipc, old: PlanId, knot: usize, patience: Duration) -> Result<Start
             let mut at = JointVector::default();
             at.copy_from_slice(&held.commanded[..MAX_DOF]);
             return Ok(Start::Held { knot: passed.unwrap_or(knot), at });
+        }
+        if let Some(lost) = pulse.look()? {
+            return Err(PublishError::Lost(Box::new(lost)).into());
         }
         std::thread::sleep(Duration::from_millis(2));
         newest = look(&telemetry, old, &mut passed)?.or(newest);

@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::EventKind;
 use nullsweep_planner::plan::{
@@ -135,4 +136,25 @@ fn a_plan_file_without_an_executor_says_so() {
     let (code, said) = ended(publish(&stage, &path, &[]));
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("no executor is running"), "{said}");
+}
+
+#[test]
+fn an_executor_that_dies_is_told_to_who_waits_for_the_plans_end() {
+    let stage = stage();
+    let arm = right_arm();
+    let sketch = Sketch::swings(&arm, &arm.home(), 20, 0.1, 0.05);
+    let path = write(&stage, "plan.json", &plan(&arm, &sketch));
+    let mut system = start(&stage, &path);
+    let mut waiting = publish(&stage, &path, &["--wait"]);
+    system.witness.see("motion", |t| t.plan.is_some() && t.knot > 0).expect("it moves");
+    assert_eq!(waiting.status().expect("known"), None);
+    system.executor.kill().expect("it can be killed");
+    let death = Instant::now();
+    let status = waiting.wait(PATIENCE).expect("known").expect("it ends");
+    let after = death.elapsed();
+    let said = format!("{}{}", waiting.stdout(), waiting.stderr());
+    assert_eq!(status.code(), Some(4), "{said}");
+    assert!(after < Duration::from_secs(2), "{after:?}: {said}");
+    assert!(said.contains("the executor's process has ended; it was last seen in mode exec"));
+    assert!(said.contains("at knot") && said.contains("help: see the executor's last lines"));
 }
