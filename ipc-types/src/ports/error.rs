@@ -19,6 +19,8 @@ use iceoryx2::service::builder::request_response::{
 use iceoryx2::service::port_factory::client::ClientCreateError;
 use iceoryx2::service::port_factory::server::ServerCreateError;
 
+use super::owner::{Foreign, User};
+
 /// Why a port could not be opened, or a plan or command not delivered.
 #[derive(Debug, thiserror::Error)]
 pub enum IpcError {
@@ -48,7 +50,26 @@ pub enum IpcError {
         /// What iceoryx2 says.
         detail: String,
     },
-    /// Files or segments belong to another user.
+    /// A file belongs to another user, who runs this robot.
+    #[error(
+        "{what}: another user's robot or folder: {} belongs to {owner}, and this process runs as \
+         {own} ({detail}); run every process as {owner}, or give this system a root path of its \
+         own (--ipc-root)",
+        .file.display()
+    )]
+    OtherUser {
+        /// Which service.
+        what: String,
+        /// The file or folder.
+        file: PathBuf,
+        /// Whose it is.
+        owner: User,
+        /// Who this process is.
+        own: User,
+        /// What iceoryx2 or the system says.
+        detail: String,
+    },
+    /// Files or segments may not be used.
     #[error(
         "{what}: no permission for the files under {} or their segments in /dev/shm ({detail}); \
          run every process as one user, or give each its own root path",
@@ -194,8 +215,21 @@ pub(super) enum Cause {
 }
 
 impl Cause {
-    pub(super) fn error(self, what: &str, root: Option<&Path>, attempts: u32) -> IpcError {
+    pub(super) fn error(
+        self,
+        what: &str,
+        root: Option<&Path>,
+        attempts: u32,
+        foreign: Option<Foreign>,
+    ) -> IpcError {
         let what = String::from(what);
+        // What another user's files cause has many names.
+        if let (Self::InFlux(detail) | Self::Permission(detail) | Self::Other(detail), Some(f)) =
+            (&self, foreign)
+        {
+            let detail = detail.clone();
+            return IpcError::OtherUser { what, file: f.file, owner: f.owner, own: f.own, detail };
+        }
         match self {
             Self::InFlux(detail) => IpcError::InFlux { what, attempts, detail },
             Self::Taken(detail) => IpcError::Taken { what, detail },
@@ -337,4 +371,35 @@ impl From<ClientCreateError> for Cause {
 
 fn shown(root: &Option<PathBuf>) -> String {
     root.as_ref().map_or_else(|| String::from("iceoryx2's root"), |p| format!("{}", p.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_users_robot_is_told_whatever_iceoryx2_calls_it() {
+        let foreign = || {
+            let file = PathBuf::from("/tmp/there/nodes");
+            Some(Foreign { file, owner: User { uid: 4_000_001 }, own: User { uid: 4_000_002 } })
+        };
+        for cause in [
+            NodeCreationFailure::InternalError.into(),
+            NodeCreationFailure::InsufficientPermissions.into(),
+            NodeCreationFailure::SystemCorrupted.into(),
+            PublisherCreateError::UnableToCreatePortTag.into(),
+            Cause::from(Ps::PublishSubscribeOpenError(PsOpen::InternalFailure)),
+        ] {
+            let text = format!("{}", cause.error("state", None, 1, foreign()));
+            let told = "state: another user's robot or folder: /tmp/there/nodes belongs to uid \
+                        4000001, and this process runs as uid 4000002 (";
+            assert!(text.starts_with(told), "{text}");
+            assert!(text.contains("or give this system a root path of its own"), "{text}");
+        }
+        // What is wrong for another reason stays so.
+        let full = Cause::from(ServerCreateError::ExceedsMaxSupportedServers);
+        assert!(matches!(full.error("command", None, 1, foreign()), IpcError::Taken { .. }));
+        let other = Cause::from(NodeCreationFailure::InternalError);
+        assert!(matches!(other.error("node", None, 1, None), IpcError::Other { .. }));
+    }
 }

@@ -13,6 +13,7 @@ mod clock;
 mod command;
 mod error;
 mod node;
+mod owner;
 mod plan;
 mod stream;
 
@@ -22,6 +23,7 @@ pub use clock::now_ns;
 pub use command::{CommandClient, CommandServer};
 pub use error::{IpcError, PortError};
 pub use node::{Ipc, free_shared_memory};
+pub use owner::User;
 pub use plan::{PlanPublisher, PlanReceiver, ReceivedPlan};
 pub use stream::{Newest, Payload, Receiver, Sender};
 

@@ -13,6 +13,7 @@ use iceoryx2::prelude::{
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::error::{Cause, IpcError};
+use super::owner::{Foreign, foreign};
 
 /// How often an operation is tried again when other processes create or remove the same service.
 const ATTEMPTS: u32 = 40;
@@ -113,9 +114,19 @@ fn retry<T, E: Into<Cause>>(
                 left -= 1;
                 thread::sleep(PAUSE);
             }
-            Err(cause) => return Err(cause.error(what, root, ATTEMPTS)),
+            Err(cause) => return Err(cause.error(what, root, ATTEMPTS, in_the_way(root))),
         }
     }
+}
+
+/// A file of another user's in this system's way.
+fn in_the_way(root: Option<&Path>) -> Option<Foreign> {
+    // Where the root path cannot be used, it or what it lies in is itself in the way.
+    let config = root.map_or_else(|| Ok(Config::global_config().clone()), configured).ok();
+    let prefix = config.as_ref().map(|c| c.global.prefix.to_string());
+    let default = config.map(|c| PathBuf::from(c.global.root_path().to_string()));
+    let place = root.map(Path::to_path_buf).or(default)?;
+    foreign(&place, prefix.as_deref())
 }
 
 /// An error where less shared memory is free than `need`. \[bytes\]
@@ -128,14 +139,24 @@ pub(super) fn need_shared_memory(need: u64) -> Result<(), IpcError> {
 
 fn config(root: Option<&Path>) -> Result<Config, IpcError> {
     let Some(root) = root else { return Ok(Config::global_config().clone()) };
-    let bad = |reason: String| IpcError::Root { path: root.to_path_buf(), reason };
-    fs::create_dir_all(root).map_err(|e| bad(e.to_string()))?;
+    configured(root).map_err(|reason| match in_the_way(Some(root)) {
+        Some(Foreign { file, owner, own }) => {
+            let what = format!("root path {}", root.display());
+            IpcError::OtherUser { what, file, owner, own, detail: reason }
+        }
+        None => IpcError::Root { path: root.to_path_buf(), reason },
+    })
+}
+
+/// The settings of a root path, which is made where it is missing.
+fn configured(root: &Path) -> Result<Config, String> {
+    fs::create_dir_all(root).map_err(|e| e.to_string())?;
     // Two names of one folder must give one system.
-    let canonical = root.canonicalize().map_err(|e| bad(e.to_string()))?;
+    let canonical = root.canonicalize().map_err(|e| e.to_string())?;
     let bytes = canonical.as_os_str().as_encoded_bytes();
-    let path = IoxPath::new(bytes).map_err(|e| bad(format!("{e:?}")))?;
+    let path = IoxPath::new(bytes).map_err(|e| format!("{e:?}"))?;
     let prefix = format!("nsw_{:08x}_", xxh3_64(bytes) >> 32);
-    let prefix = FileName::new(prefix.as_bytes()).map_err(|e| bad(format!("{e:?}")))?;
+    let prefix = FileName::new(prefix.as_bytes()).map_err(|e| format!("{e:?}"))?;
     let mut config = Config::default();
     config.global.set_root_path(&path);
     config.global.prefix = prefix;
