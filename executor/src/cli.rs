@@ -1,7 +1,7 @@
 //! The command line: `executor run`, `executor ctl`.
 
 use std::ffi::OsString;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -21,14 +21,20 @@ use signal_hook::flag;
 use crate::admit::Rules;
 use crate::executor::{Config, Summary, quantile_ns, run};
 use crate::guard::Guard;
+use crate::log::{Log, last_words};
 use crate::record::replay;
+use crate::rt::probe_cpu;
 
 /// How long `ctl` waits for an answer.
 const ANSWER_WITHIN: Duration = Duration::from_secs(1);
 
 /// Real-time executor: streams joint setpoints of published plans to a hardware endpoint.
 #[derive(Debug, Parser)]
-#[command(name = "executor", version)]
+#[command(
+    name = "executor",
+    version,
+    after_help = "Exit codes: 0 done, or ended by a signal as asked; 1 failed, or a command was not accepted; 2 wrong usage."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Action,
@@ -145,6 +151,11 @@ enum Ctl {
     Status,
 }
 
+/// The command line was wrong: ends with clap's own code.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Usage(String);
+
 /// The program: parses the arguments (the first one is the program's name), does what they say,
 /// and reports errors. Another program can call it to be an executor, given that it installs
 /// [`crate::PoolAllocator`] as its allocator.
@@ -168,13 +179,15 @@ where
     match result {
         Ok(code) => code,
         Err(e) => {
-            eprintln!("executor: {e:#}");
-            ExitCode::FAILURE
+            last_words(&format!("executor: {e:#}"));
+            ExitCode::from(if e.is::<Usage>() { 2 } else { 1 })
         }
     }
 }
 
 fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {
+    let log = Log::to_stderr();
+    let line = log.line();
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
     // Another subscriber may be there where this runs inside another program.
@@ -182,9 +195,17 @@ fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {
         .with_env_filter(filter)
         .with_target(false)
         .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr)
+        .log_internal_errors(false)
+        .with_writer(move || line.clone())
         .try_init();
+    // The usual one writes to standard error itself, which may hang.
+    std::panic::set_hook(Box::new(|panic| tracing::error!("{panic}")));
+    let result = run_logged(args);
+    log.end();
+    result
+}
 
+fn run_logged(args: &RunArgs) -> anyhow::Result<ExitCode> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGTERM, SIGINT, SIGHUP] {
         // The second signal ends the process at once, the first one stops the arm on its path.
@@ -217,7 +238,7 @@ fn arm(args: &RunArgs) -> anyhow::Result<Arm> {
         "left" => ArmSpec::pr2(Side::Left),
         links => match links.split_once(':') {
             Some((base, tip)) => ArmSpec { base: base.into(), tip: tip.into() },
-            None => bail!("--arm takes `right`, `left` or BASE:TIP, not `{links}`"),
+            None => bail!(Usage(format!("--arm takes right, left or BASE:TIP, not {links}"))),
         },
     };
     robot.arm(&spec).with_context(|| format!("arm `{}` of robot `{}`", args.arm, robot.name()))
@@ -228,7 +249,7 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         if value.is_finite() && value > 0.0 {
             Ok(value)
         } else {
-            bail!("{name} must be a positive number, not {value}")
+            bail!(Usage(format!("{name} must be a positive number, not {value}")))
         }
     };
     let from_zero = |name: &str, value: f64, most: f64| {
@@ -253,7 +274,10 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         ..Guard::new(arm.limits())
     };
     if guard.lost_ns < guard.stale_ns {
-        bail!("--lost-ms must not be below --stale-ms");
+        bail!(Usage("--lost-ms must not be below --stale-ms".into()));
+    }
+    if let Some(cpu) = args.cpu {
+        probe_cpu(cpu).map_err(|why| Usage(format!("--cpu {cpu}: {why}")))?;
     }
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let spin_us = args.spin_us.unwrap_or(if cores > 1 { 100 } else { 0 });
@@ -271,13 +295,15 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
 
 fn replay_command(file: &Path) -> anyhow::Result<ExitCode> {
     let replayed = replay(file)?;
+    let mut out = std::io::stdout().lock();
     for (cycle, event) in &replayed.events {
-        println!("cycle {cycle}: {event}");
+        writeln!(out, "cycle {cycle}: {event}")?;
     }
-    println!(
+    writeln!(
+        out,
         "{} cycles, {} setpoints, all bit-identical; {} bytes of a torn record left out",
         replayed.cycles, replayed.setpoints, replayed.torn
-    );
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -293,7 +319,8 @@ fn ctl_command(args: &CtlArgs) -> anyhow::Result<ExitCode> {
     };
     let ipc = Ipc::open(&args.system.robot_name, args.system.ipc_root.as_deref())?;
     let response = ipc.command_client()?.call(kind, value, ANSWER_WITHIN)?;
-    println!("{}", Answer(&response));
+    // Done is done, also where the answer cannot be shown: the exit code tells it too.
+    let _ = writeln!(std::io::stdout(), "{}", Answer(&response));
     let accepted = Verdict::from_wire(response.verdict) == Some(Verdict::Accepted);
     Ok(if accepted { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

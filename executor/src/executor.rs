@@ -15,10 +15,12 @@ use crate::cycle::{Ask, Order};
 use crate::driver::Driver;
 use crate::guard::Guard;
 use crate::hardware::{Hardware, IpcHardware};
+use crate::journal::Journal;
 use crate::record::{Recorder, Tape};
 use crate::rt::{self, Grid};
 use crate::service::Service;
 use crate::slots::Slots;
+use crate::words::Words;
 use crate::worker::Worker;
 
 /// The ticket of the shutdown order, which nobody waits for.
@@ -151,7 +153,8 @@ pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, Exe
         let service = spawn(scope, "service", || {
             rt::raise(helper_priority(config));
             let ipc = open(config)?;
-            let service = Service::open(&ipc, slots.clone(), arm.dof())?;
+            let journal = Journal::new(Words::of(arm, &config.robot_name, &config.guard));
+            let service = Service::open(&ipc, slots.clone(), arm.dof(), journal)?;
             open_ports.fetch_add(1, Ordering::Release);
             service.run(done);
             Ok(())

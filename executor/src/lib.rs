@@ -17,6 +17,8 @@ mod guard;
 mod hardware;
 mod ids;
 mod interpolate;
+mod journal;
+mod log;
 mod path;
 mod record;
 pub mod rt;
@@ -27,6 +29,7 @@ mod swaps;
 #[cfg(test)]
 mod testing;
 mod total;
+mod words;
 mod worker;
 
 pub use admit::{Held, Join, Rejection, Rules, ValidPlan, admit};

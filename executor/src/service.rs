@@ -13,6 +13,7 @@ use nullsweep_ipc_types::{
 
 use crate::cycle::{Ask, Event, Order, Reply, Snapshot};
 use crate::driver::widen;
+use crate::journal::Journal;
 use crate::slots::{Report, Slots};
 
 /// Pause between two rounds.
@@ -22,8 +23,6 @@ const ANSWER_WITHIN: Duration = Duration::from_millis(50);
 /// How long the last events stay readable after the end: a publisher that exits takes what was
 /// not yet read with it.
 const LINGER: Duration = Duration::from_millis(200);
-/// Least time between two warnings of missed deadlines.
-const WARN_EVERY: Duration = Duration::from_secs(10);
 
 /// The ports and what was last told. Make it on the thread that runs it.
 #[derive(Debug)]
@@ -37,12 +36,16 @@ pub(crate) struct Service {
     snapshots: u64,
     tickets: u64,
     newest: Option<Snapshot>,
-    /// Missed deadlines that were warned of, and when.
-    warned: (u64, Option<Instant>),
+    journal: Journal,
 }
 
 impl Service {
-    pub(crate) fn open(ipc: &Ipc, slots: Arc<Slots>, joint_count: usize) -> Result<Self, IpcError> {
+    pub(crate) fn open(
+        ipc: &Ipc,
+        slots: Arc<Slots>,
+        joint_count: usize,
+        journal: Journal,
+    ) -> Result<Self, IpcError> {
         Ok(Self {
             slots,
             server: ipc.command_server()?,
@@ -53,7 +56,7 @@ impl Service {
             snapshots: 0,
             tickets: 0,
             newest: None,
-            warned: (0, None),
+            journal,
         })
     }
 
@@ -73,35 +76,30 @@ impl Service {
     fn round(&mut self) {
         while let Some(event) = self.slots.events.pop() {
             self.told += 1;
-            let event = on_wire(&event, self.told);
-            if let Err(e) = self.events.send(&event) {
+            if let Err(e) = self.events.send(&on_wire(&event, self.told)) {
                 tracing::error!("plan event lost: {e}");
             }
+            self.journal.event(&event);
         }
         // Late listeners get the history also while nothing new happens.
         let _ = self.events.connect();
         if let Some(report) = self.slots.reports.pop() {
             self.snapshots += 1;
             self.newest = Some(report.snapshot);
-            self.warn_of_missed(report.snapshot.missed);
+            self.journal.report(&report.snapshot);
             let telemetry = self.telemetry_of(&report);
             if let Err(e) = self.telemetry.send(&telemetry) {
                 tracing::warn!("telemetry lost: {e}");
             }
         }
         let Self { server, slots, tickets, newest, .. } = self;
-        let answered = server.answer(|command| respond(command, slots, tickets, *newest));
+        let answered = server.answer(|command| {
+            let response = respond(command, slots, tickets, *newest);
+            Journal::command(command, &response);
+            response
+        });
         if let Err(e) = answered {
             tracing::warn!("a command was not answered: {e}");
-        }
-    }
-
-    /// Plans run later by each missed deadline: whoever watches shall know.
-    fn warn_of_missed(&mut self, missed: u64) {
-        let (told, at) = self.warned;
-        if missed > told && at.is_none_or(|at| at.elapsed() >= WARN_EVERY) {
-            tracing::warn!("{} deadlines missed, {missed} since the start", missed - told);
-            self.warned = (missed, Some(Instant::now()));
         }
     }
 

@@ -114,17 +114,18 @@ impl<'a> Worker<'a> {
             })?;
             // Only now, as writing it takes longer than the loop takes to begin with the plan.
             tracing::info!(
-                "plan {}: {knots} knots, {seconds:.1} s, checked in {:.2} ms",
+                "plan {} received: {knots} knots, {seconds:.1} s, sound by itself ({:.2} ms); \
+                 whether it fits the moment is told next",
                 header.id,
                 checked.as_secs_f64() * 1e3,
             );
             Ok(())
         });
         if let Err(why) = result {
-            tracing::warn!("plan {} rejected: {why}", header.id);
+            // The service thread tells it, with the joints' names.
             let event = Event { plan: header.id, kind: EventKind::Rejected, why };
             if self.slots.events.push(event).is_err() {
-                tracing::error!("the rejection of plan {} could not be told", header.id);
+                tracing::error!("plan {} rejected: {why}; its publisher is not told", header.id);
             }
         }
     }

@@ -74,6 +74,35 @@ pub fn become_real_time(priority: u8, cpu: Option<usize>) -> (bool, Denied) {
     (fifo, denied)
 }
 
+/// Whether a thread of this process can be pinned to `cpu`; else why not. CPUs that are kept free of
+/// ordinary threads (`isolcpus`) are not in the process's own set and can be pinned to, so it is
+/// tried.
+///
+/// # Errors
+/// In words, where there is no such CPU or the process may not use it.
+pub fn probe_cpu(cpu: usize) -> Result<(), String> {
+    let pinned = std::thread::spawn(move || {
+        if cpu >= CpuSet::MAX_CPU {
+            return Err(io::Error::from(io::ErrorKind::InvalidInput));
+        }
+        let mut set = CpuSet::new();
+        set.set(cpu);
+        sched_setaffinity(None, &set).map_err(io::Error::from)
+    });
+    match pinned.join() {
+        Ok(Err(e)) if e.kind() == io::ErrorKind::InvalidInput => {
+            // SAFETY: sysconf only reads.
+            let count = unsafe { libc::sysconf(libc::_SC_NPROCESSORS_ONLN) };
+            Err(format!(
+                "no such CPU can be used: {count} are online, counted from 0, and a container or \
+                 cpuset may allow fewer"
+            ))
+        }
+        Ok(Err(e)) => Err(format!("pinning is refused: {e}")),
+        Ok(Ok(())) | Err(_) => Ok(()),
+    }
+}
+
 /// Locks all memory of the process: what is there, code included, is brought in now, so that no
 /// thread faults on it later. What is mapped later is locked as it is touched, because filling a
 /// whole segment at once would take long.
@@ -131,4 +160,19 @@ fn touch_stack() {
         *page = 1;
     }
     std::hint::black_box(&stack);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cpu_that_is_not_there_is_told() {
+        // At least one of them can be used.
+        assert!((0..CpuSet::MAX_CPU).any(|cpu| probe_cpu(cpu).is_ok()));
+        for cpu in [CpuSet::MAX_CPU - 1, CpuSet::MAX_CPU, usize::MAX] {
+            let why = probe_cpu(cpu).unwrap_err();
+            assert!(why.contains("are online, counted from 0"), "{why}");
+        }
+    }
 }

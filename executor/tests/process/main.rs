@@ -2,6 +2,8 @@
 
 mod commands;
 mod endurance;
+mod log;
+mod other_user;
 mod plans;
 mod recording;
 mod replaced;

@@ -53,16 +53,20 @@ impl Drop for Executor {
     }
 }
 
+/// The program with these arguments.
+pub(crate) fn command(arguments: &[&str], stderr: Stdio) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_executor"));
+    command.args(arguments).stderr(stderr);
+    command
+}
+
 pub(crate) fn executor(root: &TempDir, more: &[&str]) -> Executor {
-    let child = Command::new(env!("CARGO_BIN_EXE_executor"))
-        .arg("run")
-        .arg("--ipc-root")
-        .arg(root.path())
-        .args(more)
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    Executor(child)
+    start(root, more, Stdio::piped())
+}
+
+fn start(root: &TempDir, more: &[&str], stderr: Stdio) -> Executor {
+    let here = root.path().to_str().unwrap();
+    Executor(command(&["run", "--ipc-root", here], stderr).args(more).spawn().unwrap())
 }
 
 impl System {
@@ -72,15 +76,22 @@ impl System {
 
     /// With more arguments; `ROOT` in one stands for the root folder.
     pub(crate) fn start_with(more: &[&str]) -> Self {
+        Self::start_to(more, None)
+    }
+
+    /// With another standard error than a pipe into the log.
+    pub(crate) fn start_to(more: &[&str], stderr: Option<Stdio>) -> Self {
         let root = TempDir::new().unwrap();
         let ipc = Ipc::open("pr2", Some(root.path())).unwrap();
         let here = root.path().to_str().unwrap();
         let more: Vec<String> = more.iter().map(|a| a.replace("ROOT", here)).collect();
         let arguments: Vec<&str> =
             PATIENT.iter().copied().chain(more.iter().map(String::as_str)).collect();
-        let mut executor = executor(&root, &arguments);
-        let lines = BufReader::new(executor.0.stderr.take().unwrap()).lines();
-        let log = thread::spawn(move || lines.map_while(Result::ok).collect());
+        let mut executor = start(&root, &arguments, stderr.unwrap_or_else(Stdio::piped));
+        let lines = executor.0.stderr.take().map(|pipe| BufReader::new(pipe).lines());
+        let log = thread::spawn(move || {
+            lines.map(|lines| lines.map_while(Result::ok).collect()).unwrap_or_default()
+        });
         let over = Arc::new(AtomicBool::new(false));
         let endpoint = {
             let (path, over) = (root.path().to_path_buf(), over.clone());
@@ -144,6 +155,11 @@ impl System {
             *to = joint.position;
         }
         (header, knots)
+    }
+
+    /// The endpoint sends no more.
+    pub(crate) fn silence(&self) {
+        self.over.store(true, Ordering::Release);
     }
 
     pub(crate) fn terminate(&self) {
