@@ -75,3 +75,14 @@ fn the_mock_process_keeps_every_rule() {
     assert_eq!(run.status.code(), Some(0), "{said}{complained}\nmock: {}", mock.stderr());
     assert_eq!(said.matches("kept").count(), 10, "{said}");
 }
+
+#[test]
+fn without_an_endpoint_it_could_not_be_tried() {
+    let stage = Stage::new(env!("CARGO_BIN_EXE_demo"), "pr2").expect("a folder for the test");
+    let ended = Command::new(env!("CARGO_BIN_EXE_conformance")).args(stage.place()).output();
+    let ended = ended.expect("it starts");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(2), "{said}");
+    assert!(said.contains("no endpoint sends joint states for robot `pr2`"), "{said}");
+    assert!(ended.stdout.is_empty(), "no table of rules that were not tried");
+}

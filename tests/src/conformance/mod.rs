@@ -9,8 +9,10 @@ use std::ffi::OsString;
 use std::fs::File;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::thread;
+use std::time::{Duration, Instant};
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::Parser;
 use comfy_table::{Table, presets};
 use nullsweep_executor::rt::become_real_time;
@@ -24,10 +26,13 @@ use crate::clock::Grid;
 pub use checks::{Broken, Check, Terms, checks};
 pub use rig::{Clock, Rig, VirtualClock, VirtualEndpoint};
 
+/// How long an endpoint may take to send its first state.
+const APPEARS_WITHIN: Duration = Duration::from_secs(3);
+
 /// Tries an endpoint in the executor's place, rule by rule.
 ///
 /// THE ARM MOVES: each joint by --angle and back. Keep a hand on the run stop. Ends with 0 if every
-/// rule is kept, 1 if one is broken.
+/// rule is kept, 1 if one is broken, 2 if it could not be tried: no endpoint, or wrong usage.
 #[derive(Debug, Parser)]
 #[command(name = "conformance", version)]
 struct Args {
@@ -113,8 +118,9 @@ fn run(args: &Args) -> anyhow::Result<bool> {
     }
     let arm = args.arm.load()?;
     let ipc = Ipc::open(&args.arm.robot_name, args.arm.ipc_root.as_deref())?;
-    let hardware = IpcHardware::open(&ipc)
+    let mut hardware = IpcHardware::open(&ipc)
         .context("the executor's place is not free: end the executor first")?;
+    wait_for_states(&mut hardware, args)?;
     let terms = Terms {
         angle: args.angle,
         speed: args.speed,
@@ -142,6 +148,24 @@ fn run(args: &Args) -> anyhow::Result<bool> {
         None => println!("{}", table(&found)),
     }
     Ok(found.iter().all(|f| f.broken.is_none()))
+}
+
+/// Without any state there is nothing to try: that is no broken rule.
+fn wait_for_states(hardware: &mut IpcHardware, args: &Args) -> anyhow::Result<()> {
+    let start = Instant::now();
+    while start.elapsed() < APPEARS_WITHIN {
+        if hardware.read()?.is_some() {
+            return Ok(());
+        }
+        thread::sleep(Duration::from_millis(5));
+    }
+    let root = args.arm.ipc_root.as_ref();
+    let place = root.map_or("the default root path".into(), |r| r.display().to_string());
+    bail!(
+        "no endpoint sends joint states for robot `{}` under {place}: start it with this \
+         --robot-name and --ipc-root first",
+        args.arm.robot_name
+    )
 }
 
 fn table(found: &[Finding]) -> Table {

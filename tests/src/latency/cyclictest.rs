@@ -11,6 +11,10 @@ use super::stats::Times;
 /// Longest lateness that its histogram tells apart. \[µs\]
 const LONGEST_US: u64 = 100_000;
 
+/// What is said where it is not installed.
+pub(super) const ABSENT: &str = "cyclictest is not installed (Debian: rt-tests): its row and the \
+                                 targets for wake-up lateness p50 and p99 beside it are left out";
+
 /// Wake-up lateness of one cyclictest thread at 1 kHz, in whole microseconds; `None` where it is
 /// not installed. It leaves missed deadlines out of its count.
 pub(super) fn run(

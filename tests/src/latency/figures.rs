@@ -10,8 +10,8 @@ use nullsweep_ipc_types::HISTOGRAM_BUCKETS;
 use serde::Serialize;
 
 use super::args::Args;
-use super::picture;
 use super::stats::{Percentiles, Times, of_buckets};
+use super::{cyclictest, picture};
 use crate::judge::Verdict;
 
 /// One row of the table.
@@ -111,6 +111,8 @@ pub struct Figures {
     pub rows: Vec<Row>,
     /// Figures beside their targets.
     pub targets: Vec<Target>,
+    /// What was left out, and why.
+    pub left_out: Option<&'static str>,
     /// Deadlines that the executor missed.
     pub missed_cycles: u64,
     /// The executor's armed cycles.
@@ -215,6 +217,7 @@ impl Sums {
             knots: args.knots,
             rows: self.rows(),
             targets: self.targets(),
+            left_out: self.cyclictest.is_none().then_some(cyclictest::ABSENT),
             missed_cycles: self.missed,
             armed: self.armed,
             swaps: self.swaps,
@@ -282,10 +285,11 @@ impl Figures {
         for column in targets.column_iter_mut().skip(1).take(2) {
             column.set_cell_alignment(CellAlignment::Right);
         }
+        let left_out = self.left_out.map(|why| format!("{why}\n")).unwrap_or_default();
         let kind = if self.realtime_kernel { "a real-time kernel" } else { "no real-time kernel" };
         let stress = if self.stressed { ", with stress-ng" } else { "" };
         format!(
-            "{table}\n{targets}\nkernel {} ({kind}), {} processors, load {} at the start{stress}, {} s\n\
+            "{table}\n{targets}\n{left_out}kernel {} ({kind}), {} processors, load {} at the start{stress}, {} s\n\
              executor histograms are told by the upper bound of their bucket; {} deadlines missed; \
              armed for {} cycles\n\
              {} plans of {} knots at random moments, {} accepted; {} violations at the endpoint\n\
@@ -319,6 +323,8 @@ fn read(path: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
 
     #[test]
@@ -327,6 +333,19 @@ mod tests {
         armed.add("12:00 INFO 99 cycles, 1 deadlines missed; armed for 80 cycles: 2 system-heap calls, 3 page faults; 7 blocks");
         armed.add("nothing of that kind");
         assert_eq!((armed.cycles, armed.heap_calls, armed.page_faults), (80, 2, 3));
+    }
+
+    /// Two targets need cyclictest: without it a line says that they are missing.
+    #[test]
+    fn a_missing_yardstick_is_told() {
+        let args = Args::parse_from(["latency"]);
+        let mut sums = Sums::default();
+        let with = "cyclictest's";
+        let told = sums.figures(&args, String::new()).table();
+        assert!(told.contains(cyclictest::ABSENT) && !told.contains(with), "{told}");
+        sums.cyclictest = Some(Times::default());
+        let told = sums.figures(&args, String::new()).table();
+        assert!(!told.contains("not installed") && told.contains(with), "{told}");
     }
 
     #[test]

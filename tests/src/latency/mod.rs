@@ -73,6 +73,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<Figures> {
+    if let Some(cpu) = args.cpu {
+        rt::probe_cpu(cpu).map_err(|why| anyhow::anyhow!("--cpu {cpu}: {why}"))?;
+    }
     let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right))?;
     let load = args.load.then(Load::start).transpose()?;
     if load.is_some() {
