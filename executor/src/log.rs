@@ -202,7 +202,10 @@ mod tests {
         }
     }
 
-    fn stuck() -> (Log, mpsc::Sender<io::Result<()>>, Arc<Mutex<Vec<u8>>>) {
+    /// Lets one write go on, with its result.
+    type Go = mpsc::Sender<io::Result<()>>;
+
+    fn stuck() -> (Log, Go, Arc<Mutex<Vec<u8>>>) {
         let (sender, go) = mpsc::channel();
         let written = Arc::new(Mutex::new(Vec::new()));
         (Log::start(Stuck { go, written: written.clone() }), sender, written)

@@ -25,8 +25,8 @@ pub(crate) struct Words {
     robot: String,
     joints: Vec<Name>,
     held: Vec<Name>,
-    /// What a plan's velocities are compared with. \[rad/s\]
-    velocity_tolerance: f64,
+    /// What a plan's velocity is compared with, for each joint. \[rad/s\] or \[m/s\]
+    velocity_tolerances: Vec<f64>,
 }
 
 impl Words {
@@ -45,7 +45,7 @@ impl Words {
             robot: robot.into(),
             joints: joints.collect(),
             held: held.collect(),
-            velocity_tolerance: guard.velocity_tolerance(),
+            velocity_tolerances: (0..arm.dof()).map(|j| guard.velocity_tolerance(j)).collect(),
         }
     }
 
@@ -87,10 +87,12 @@ impl Words {
             return text;
         }
         let per_second = reason == Reason::Velocity
-            || reason == Reason::Start && bound == self.velocity_tolerance;
+            || reason == Reason::Start
+                && self.velocity_tolerances.get(joint as usize) == Some(&bound);
         let unit = match reason {
             Reason::TimeOrder | Reason::Epoch => " ns".into(),
             _ if unit.is_empty() => String::new(),
+            Reason::Acceleration => format!(" {unit}/s²"),
             _ if per_second => format!(" {unit}/s"),
             _ => format!(" {unit}"),
         };
@@ -99,7 +101,7 @@ impl Words {
                 write!(text, ": planned for {value:.4}{unit}, measured at {bound:.4}{unit}")
             }
             Reason::Start => write!(text, ": {value:.6}{unit} off, at most {bound:.6}{unit}"),
-            Reason::SoftLimit | Reason::Velocity => {
+            Reason::SoftLimit | Reason::Velocity | Reason::Acceleration => {
                 write!(text, ": {value:.4}{unit} against the limit {bound:.4}{unit}")
             }
             _ if bound.is_nan() => write!(text, ": {value}{unit}"),
@@ -224,6 +226,11 @@ fn remedy(reason: Reason, kind: EventKind) -> &'static str {
         Reason::NotFinite | Reason::TimeOrder => "its sender is at fault",
         Reason::SoftLimit => "plan within this executor's limits: with the same --urdf",
         Reason::Velocity => "plan within this executor's limits: the same --urdf, a lower --v-max",
+        Reason::Acceleration => {
+            "plan within this executor's limits (the same --urdf, --profile acceleration), or stop \
+             before it (--join stop)"
+        }
+        Reason::Repeated => "nothing: the plan that came first counts; publish gives a new id",
         Reason::Start => "plan from where the arm holds (--start), or take the arm there first",
         Reason::JoinPlan => "publish with --join stop, or continue the plan that runs",
         Reason::JoinKnot => "continue from a later knot (--continue PLAN@K)",
@@ -279,7 +286,7 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("; plan from where the arm holds"), "{text}");
-        let text = rejected(start.value(0.35, guard.velocity_tolerance()));
+        let text = rejected(start.value(0.35, guard.velocity_tolerance(0)));
         assert!(text.contains("0.350000 rad/s off"), "{text}");
         let text = rejected(Rejection::new(Reason::Velocity).knot(4).joint(1).value(3.0, 2.0));
         assert!(text.contains("r_shoulder_lift_joint: 3.0000 rad/s against the limit"), "{text}");
