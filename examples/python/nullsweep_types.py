@@ -207,6 +207,8 @@ class Fault(enum.IntEnum):
     LOW_RATE = 10
     JOINT_COUNT = 11
     HELD_JOINT = 13
+    ANSWER = 14
+    CLOCK = 15
 
 
 _TEXTS[Mode] = {
@@ -231,6 +233,8 @@ _TEXTS[Fault] = {
     Fault.LOW_RATE: "the loop's mean rate is too low",
     Fault.JOINT_COUNT: "the joint state has another number of joints",
     Fault.HELD_JOINT: "a held joint has moved",
+    Fault.ANSWER: "the hardware endpoint does not say which setpoint it follows",
+    Fault.CLOCK: "the joint state is not stamped by CLOCK_MONOTONIC",
 }
 
 
@@ -300,6 +304,7 @@ class Reason(enum.IntEnum):
     SHUTDOWN = 17
     ACCELERATION = 19
     REPEATED = 20
+    GOAL = 21
 
 
 _TEXTS[EventKind] = {
@@ -331,6 +336,7 @@ _TEXTS[Reason] = {
     Reason.SHUTDOWN: "the executor shut down",
     Reason.ACCELERATION: "above the acceleration limit",
     Reason.REPEATED: "a plan of this id came before",
+    Reason.GOAL: "the arm did not come to rest at the plan's end",
 }
 
 

@@ -109,6 +109,12 @@ struct RunArgs {
     /// Following error that is allowed for each unit of commanded speed. [s]
     #[arg(long, default_value_t = 0.15)]
     following_lag: f64,
+    /// How far the arm may be from a plan's last knot for the plan to be finished. [rad or m]
+    #[arg(long, default_value_t = Guard::GOAL_TOLERANCE)]
+    goal_tolerance: f64,
+    /// How long it may take to come to rest there before the plan is aborted instead.
+    #[arg(long, default_value_t = 1000.0)]
+    goal_ms: f64,
     /// Acceleration of stops, pauses and changes of speed along the path, each joint. [rad/s²]
     #[arg(long, default_value_t = 10.0)]
     stop_acceleration: f64,
@@ -270,6 +276,8 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         held_drift: 2.0 * positive("--held-tolerance", args.held_tolerance)?,
         following_error: positive("--following-error", args.following_error)?,
         following_lag: from_zero("--following-lag", args.following_lag, 10.0)?,
+        goal_tolerance: positive("--goal-tolerance", args.goal_tolerance)?,
+        goal_ns: nanos("--goal-ms", args.goal_ms)?,
         min_rate: from_zero("--min-rate", args.min_rate, 1.0)? * rate,
         ..Guard::new(arm.limits())
     };

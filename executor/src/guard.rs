@@ -58,6 +58,13 @@ pub struct Guard {
     pub following_error: f64,
     /// Following error that is allowed for each unit of commanded speed. \[s\]
     pub following_lag: f64,
+    /// How far the arm may be from a plan's last knot for the plan to be finished. \[rad\]
+    pub goal_tolerance: f64,
+    /// How long it must have been measured there. \[ns\]
+    pub settle_ns: u64,
+    /// How long after its last knot was commanded a plan may take to finish, else it is aborted.
+    /// \[ns\]
+    pub goal_ns: u64,
     /// States in a row with too large a following error (or an endpoint that says that it got no
     /// setpoints) that make a fault.
     pub debounce: u32,
@@ -74,6 +81,8 @@ impl Guard {
     pub const FARTHEST: f64 = 1000.0;
     /// The least share of its acceleration with which a joint is led to a first knot.
     pub const APPROACH: f64 = 0.1;
+    /// Default of [`Self::goal_tolerance`]. \[rad\]
+    pub const GOAL_TOLERANCE: f64 = 0.02;
 
     /// Guards these joints with the default parameters at a 1 kHz cycle. At most
     /// [`MAX_DOF`] joints are used.
@@ -105,6 +114,9 @@ impl Guard {
             held_drift: 0.02,
             following_error: 0.1,
             following_lag: 0.15,
+            goal_tolerance: Self::GOAL_TOLERANCE,
+            settle_ns: 50_000_000,
+            goal_ns: 1_000_000_000,
             debounce: 20,
             min_rate: 750.0,
         }

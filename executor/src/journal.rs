@@ -10,7 +10,7 @@ use crate::words::{self, Words};
 /// A start and a reset pass through [`Mode::Init`] in less.
 const WAITS: Duration = Duration::from_millis(500);
 /// Least time between two warnings of missed deadlines.
-const WARN_EVERY: Duration = Duration::from_secs(10);
+pub(crate) const WARN_EVERY: Duration = Duration::from_secs(10);
 
 /// What was last told.
 #[derive(Debug)]

@@ -11,9 +11,9 @@ use nullsweep_ipc_types::{
     Command, CommandKind, Fault, MAX_JOINTS, Mode, PlanEvent, PlanId, Response, Telemetry, Verdict,
 };
 
-use crate::cycle::{Ask, Event, Order, Reply, Snapshot};
+use crate::cycle::{Ask, Event, Order, Refused, Reply, Snapshot};
 use crate::driver::widen;
-use crate::journal::Journal;
+use crate::journal::{Journal, WARN_EVERY};
 use crate::slots::{Report, Slots};
 
 /// Pause between two rounds.
@@ -37,6 +37,8 @@ pub(crate) struct Service {
     tickets: u64,
     newest: Option<Snapshot>,
     journal: Journal,
+    /// Joint states refused for their stamps that were warned of, and when.
+    refused: (u64, Option<Instant>),
 }
 
 impl Service {
@@ -57,6 +59,7 @@ impl Service {
             tickets: 0,
             newest: None,
             journal,
+            refused: (0, None),
         })
     }
 
@@ -87,6 +90,7 @@ impl Service {
             self.snapshots += 1;
             self.newest = Some(report.snapshot);
             self.journal.report(&report.snapshot);
+            self.warn_of_refused(&report.snapshot.refused);
             let telemetry = self.telemetry_of(&report);
             if let Err(e) = self.telemetry.send(&telemetry) {
                 tracing::warn!("telemetry lost: {e}");
@@ -100,6 +104,15 @@ impl Service {
         });
         if let Err(e) = answered {
             tracing::warn!("a command was not answered: {e}");
+        }
+    }
+
+    /// Without it, an endpoint with another clock is only one that is silent.
+    fn warn_of_refused(&mut self, refused: &Refused) {
+        let (told, at) = self.refused;
+        if refused.count > told && at.is_none_or(|at| at.elapsed() >= WARN_EVERY) {
+            tracing::warn!("{}", refusal(refused, refused.count - told));
+            self.refused = (refused.count, Some(Instant::now()));
         }
     }
 
@@ -124,6 +137,18 @@ impl Service {
             knot: snapshot.knot,
         }
     }
+}
+
+/// What was refused, and which clock it may be.
+fn refusal(refused: &Refused, new: u64) -> String {
+    let seconds = refused.ahead_ns.unsigned_abs() as f64 * 1e-9;
+    let side = if refused.ahead_ns > 0 { "ahead of" } else { "behind" };
+    // No machine has been on for as long as it is since 1970.
+    let epoch = if seconds > 1e9 { ", as CLOCK_REALTIME is" } else { "" };
+    format!(
+        "{new} joint states refused: the last one's stamp is {seconds:.3} s {side} \
+         CLOCK_MONOTONIC{epoch}; the endpoint must stamp by CLOCK_MONOTONIC"
+    )
 }
 
 /// Asks the loop and waits for its answer: one or two cycles.
@@ -189,5 +214,20 @@ fn on_wire(event: &Event, sequence: u64) -> PlanEvent {
         reason: event.why.reason.wire(),
         joint: event.why.joint,
         knot: event.why.knot,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_stamp_is_told_with_its_clock() {
+        let told = |ahead_ns| refusal(&Refused { count: 9, at_ns: 1, ahead_ns }, 3);
+        let hour = told(3_600_000_000_000);
+        assert!(hour.starts_with("3 joint states refused") && hour.contains("3600.000 s ahead of"));
+        assert!(!hour.contains("REALTIME"), "{hour}");
+        assert!(told(1_764_000_000_000_000_000).contains("as CLOCK_REALTIME is"));
+        assert!(told(-2_000_000_000).contains("2.000 s behind CLOCK_MONOTONIC"));
     }
 }

@@ -230,11 +230,22 @@ impl Sim {
         ask: Option<Order>,
         offer: Option<Arc<ValidPlan>>,
     ) -> Output {
+        let now = self.now + self.guard.period_ns;
+        let measured = measured
+            .map(|m| Measured { stamp_ns: now.min(m.stamp_ns + self.guard.period_ns), ..m });
+        self.tick_stamped(measured, ask, offer)
+    }
+
+    /// A cycle with a state whose stamp is as it is given.
+    pub(crate) fn tick_stamped(
+        &mut self,
+        measured: Option<Measured>,
+        ask: Option<Order>,
+        offer: Option<Arc<ValidPlan>>,
+    ) -> Output {
         self.now += self.guard.period_ns;
         self.tickets += 1;
         let ask = ask.map(|order| Ask { ticket: self.tickets, order });
-        let measured = measured
-            .map(|m| Measured { stamp_ns: self.now.min(m.stamp_ns + self.guard.period_ns), ..m });
         let input = Input { measured, ask, offer, missed: 0 };
         let out = step(&mut self.state, input, self.now, &self.guard);
         self.judge(&out);

@@ -153,6 +153,14 @@ impl Words {
             Fault::CommunicationLost => {
                 "start the hardware endpoint again, then `executor ctl reset`"
             }
+            Fault::Answer => {
+                "the endpoint must say in each state which setpoint it follows (docs/endpoints.md); \
+                 then `executor ctl reset`"
+            }
+            Fault::Clock => {
+                "the endpoint must stamp its states by CLOCK_MONOTONIC of this machine; then \
+                 `executor ctl reset`"
+            }
             Fault::Halted => "release the run stop, then `executor ctl resume`",
             Fault::NotCalibrated => "calibrate the arm, then `executor ctl reset`",
             Fault::Endpoint => "the endpoint's own log says why; then `executor ctl reset`",
@@ -230,6 +238,7 @@ fn remedy(reason: Reason, kind: EventKind) -> &'static str {
             "plan within this executor's limits (the same --urdf, --profile acceleration), or stop \
              before it (--join stop)"
         }
+        Reason::Goal => "look what holds the arm; the bounds are --goal-tolerance and --goal-ms",
         Reason::Repeated => "nothing: the plan that came first counts; publish gives a new id",
         Reason::Start => "plan from where the arm holds (--start), or take the arm there first",
         Reason::JoinPlan => "publish with --join stop, or continue the plan that runs",

@@ -69,6 +69,8 @@ wire_enum! {
         Acceleration = 19 => "above the acceleration limit",
         /// A plan of the same id came before: that one alone counts.
         Repeated = 20 => "a plan of this id came before",
+        /// The last knot was commanded, but the arm did not come to rest there in time.
+        Goal = 21 => "the arm did not come to rest at the plan's end",
     }
 }
 

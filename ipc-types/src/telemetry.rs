@@ -54,6 +54,11 @@ wire_enum! {
         JointCount = 11 => "the joint state has another number of joints",
         /// A joint that the running plan takes as fixed has moved: the arm was stopped on its path.
         HeldJoint = 13 => "a held joint has moved",
+        /// States come, but for too long they have named no setpoint that can be in force: none,
+        /// an old one, or one that was never sent.
+        Answer = 14 => "the hardware endpoint does not say which setpoint it follows",
+        /// States come, but their stamps are ahead of `CLOCK_MONOTONIC` or far behind it.
+        Clock = 15 => "the joint state is not stamped by CLOCK_MONOTONIC",
     }
 }
 

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::{Fault, Mode};
 
-use super::exchange::Measured;
+use super::exchange::{Measured, Refused};
 use super::state::{REMEMBERED, State, small};
 use super::watch::Watch;
 use crate::JointVector;
@@ -30,6 +30,10 @@ pub struct Checkpoint {
     window_cycles: u32,
     measured: MeasuredRecord,
     fresh_ns: u64,
+    answered: u64,
+    refused: u64,
+    refused_ns: u64,
+    refused_ahead_ns: i64,
     window_start_ns: u64,
     windows: u64,
     rates: [f64; 3],
@@ -99,6 +103,10 @@ impl State {
             window_cycles: watch.window_cycles,
             measured: watch.newest.as_ref().map_or_else(MeasuredRecord::zeroed, Into::into),
             fresh_ns: watch.fresh_ns,
+            answered: watch.answered,
+            refused: watch.refused.count,
+            refused_ns: watch.refused.at_ns,
+            refused_ahead_ns: watch.refused.ahead_ns,
             window_start_ns: watch.window_start_ns,
             windows: watch.windows,
             rates: watch.rates,
@@ -133,6 +141,12 @@ impl State {
                 fresh_ns: saved.fresh_ns,
                 following: saved.following,
                 unheard: saved.unheard,
+                answered: saved.answered,
+                refused: Refused {
+                    count: saved.refused,
+                    at_ns: saved.refused_ns,
+                    ahead_ns: saved.refused_ahead_ns,
+                },
                 window_start_ns: saved.window_start_ns,
                 window_cycles: saved.window_cycles,
                 rates: saved.rates,

@@ -94,6 +94,17 @@ pub struct Measured {
     pub status: u32,
 }
 
+/// States that were not taken because of their stamps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Refused {
+    /// How many, since the start.
+    pub count: u64,
+    /// When the last one came, 0 once a good one has come since. \[ns\]
+    pub at_ns: u64,
+    /// How far its stamp was ahead of the loop's clock. \[ns\]
+    pub ahead_ns: i64,
+}
+
 /// Set in [`Measured::status`] while a held joint is not where it was when the motion began. The
 /// endpoint has no say in this bit.
 pub const HELD_MOVED: u32 = 1 << 31;
@@ -160,6 +171,8 @@ pub struct Snapshot {
     pub rate: f64,
     /// Speed scale asked for.
     pub scale: f64,
+    /// Joint states that were refused for their stamps.
+    pub refused: Refused,
     /// Commanded positions. \[rad\] or \[m\]
     pub commanded: JointVector,
     /// Measured positions, 0 before the first state. \[rad\] or \[m\]

@@ -6,9 +6,9 @@
 //!
 //! | mode | leaves it by |
 //! |---|---|
-//! | Init | a fresh, finite state of a calibrated, running endpoint, and commanded = measured → Hold |
+//! | Init | a fresh, finite state of a calibrated, running endpoint that answers the setpoints, and commanded = measured → Hold |
 //! | Hold | an accepted plan → Executing |
-//! | Executing | last knot → Hold or the next plan; pause → Paused; stop, stale state, moved held joint → Stopping |
+//! | Executing | last knot, and the arm measured there → Hold or the next plan; pause → Paused; stop, stale state, moved held joint → Stopping |
 //! | Paused | resume → Executing; stop → Stopping |
 //! | Stopping | stand-still → Hold, or Executing the plan that was waited for |
 //! | Fault | reset (or resume after a halt), once the cause is gone → Init |
@@ -16,9 +16,11 @@
 //! Any mode but Init goes to Fault. The commanded position is always continued from the last
 //! commanded one.
 
+mod answer;
 mod checkpoint;
 mod command;
 mod exchange;
+mod goal;
 mod motion;
 mod offer;
 mod state;
@@ -30,7 +32,8 @@ use state::REMEMBERED;
 
 pub use checkpoint::{Checkpoint, MeasuredRecord};
 pub use exchange::{
-    Ask, EVENTS, Event, HELD_MOVED, Input, Measured, Order, Output, Reply, Snapshot, Target,
+    Ask, EVENTS, Event, HELD_MOVED, Input, Measured, Order, Output, Refused, Reply, Snapshot,
+    Target,
 };
 pub use state::{State, WAITING};
 
@@ -46,8 +49,8 @@ pub fn step(state: &mut State, input: Input, now_ns: u64, guard: &Guard) -> Outp
     if let Some(plan) = input.offer {
         state.consider(plan, now_ns, guard, &mut out);
     }
-    state.advance(guard, &mut out);
-    state.emit(&mut out);
+    state.advance(now_ns, guard, &mut out);
+    state.emit(guard, &mut out);
     out
 }
 

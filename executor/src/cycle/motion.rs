@@ -19,7 +19,7 @@ const LIMIT_SLACK: f64 = 1e-6;
 
 impl State {
     /// Moves the commanded position on by one cycle.
-    pub(super) fn advance(&mut self, guard: &Guard, out: &mut Output) {
+    pub(super) fn advance(&mut self, now_ns: u64, guard: &Guard, out: &mut Output) {
         let go = self.stop.is_none() && !self.paused && self.mode != Mode::Fault;
         let target = if go { self.scale } else { 0.0 };
         let Some(path) = self.path.as_mut() else {
@@ -42,7 +42,7 @@ impl State {
         self.q = sample.q;
         self.v = sample.v;
         if ended {
-            self.finish(guard, out);
+            self.arrive(now_ns, guard, out);
         } else if still {
             self.stand(guard, out);
         } else if self.mode == Mode::Paused {
@@ -72,14 +72,10 @@ impl State {
         self.live = true;
     }
 
-    /// The last knot is commanded.
-    fn finish(&mut self, guard: &Guard, out: &mut Output) {
+    /// The arm rests at the last knot.
+    pub(super) fn finish(&mut self, guard: &Guard, out: &mut Output) {
         let rate = self.path.as_ref().map_or(0.0, |p| p.progress().rate);
         self.end_path(EventKind::Finished, Reason::None, out);
-        if self.stop.is_some() || self.mode == Mode::Fault {
-            self.come_to_rest(guard, out);
-            return;
-        }
         self.drop_path(out);
         self.mode = Mode::Hold;
         if let Some(next) = self.queue.pop_front() {
@@ -99,7 +95,7 @@ impl State {
     }
 
     /// The stop is done: the path ends here.
-    fn come_to_rest(&mut self, guard: &Guard, out: &mut Output) {
+    pub(super) fn come_to_rest(&mut self, guard: &Guard, out: &mut Output) {
         let stop = self.stop.take();
         let (kind, why) = match stop {
             Some(StopCause::Replace) => (EventKind::Superseded, Reason::None),

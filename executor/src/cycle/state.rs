@@ -34,6 +34,15 @@ pub(super) enum Turn {
     After,
 }
 
+/// How long the arm has been waited for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Arrival {
+    /// When the last knot was commanded. \[ns\]
+    pub(super) since_ns: u64,
+    /// When the first of the states was measured that have the arm there without a break. \[ns\]
+    pub(super) near_ns: Option<u64>,
+}
+
 /// Why the arm is stopping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum StopCause {
@@ -61,6 +70,8 @@ pub struct State {
     pub(super) path: Option<Path>,
     /// Whether the path's plan still needs its end event; not while a fault brakes on it.
     pub(super) live: bool,
+    /// While the arm is waited for at the path's end.
+    pub(super) arrival: Option<Arrival>,
     pub(super) queue: Deque<Waiting, WAITING>,
     pub(super) stop: Option<StopCause>,
     pub(super) paused: bool,
@@ -85,6 +96,7 @@ impl Default for State {
             has_position: false,
             path: None,
             live: false,
+            arrival: None,
             queue: Deque::new(),
             stop: None,
             paused: false,
@@ -114,6 +126,7 @@ impl State {
             rate: path.map_or(0.0, |p| p.progress().rate),
             scale: self.scale,
             commanded: self.q,
+            refused: self.watch.refused,
             measured: self.watch.measured().map_or(JointVector::ZERO, |m| m.q),
         }
     }
@@ -161,6 +174,7 @@ impl State {
             out.retire(path.into_plan());
         }
         self.live = false;
+        self.arrival = None;
         self.v = JointVector::ZERO;
     }
 }

@@ -3,7 +3,7 @@
 use nullsweep_ipc_types::{EventKind, Fault, Mode, Reason, status};
 
 use super::exchange::{HELD_MOVED, Measured, Output};
-use super::state::{REMEMBERED, State, StopCause};
+use super::state::{State, StopCause};
 use super::watch::Reaction;
 use crate::JointVector;
 use crate::guard::Guard;
@@ -21,20 +21,25 @@ impl State {
         guard: &Guard,
         out: &mut Output,
     ) {
-        let bad = measured.and_then(|m| self.watch.take(m, now_ns, guard));
+        let near = self.has_position.then_some(&self.q);
+        let taken = measured.map_or(Ok(false), |m| self.watch.take(m, near, now_ns, guard));
+        let bad = taken.err();
+        let fresh = self.watch.newest.filter(|_| taken == Ok(true));
+        self.note_answer(fresh.as_ref());
         let low_rate = self.watch.rate_is_low(now_ns, guard);
         match self.mode {
             Mode::Init => self.initialise(bad, now_ns, guard),
-            Mode::Fault => self.follow_if_limp(guard, out),
+            Mode::Fault => self.follow_if_limp(now_ns, guard, out),
             Mode::Hold | Mode::Executing | Mode::Paused | Mode::Stopping => {
                 let age = self.watch.age(now_ns);
                 let fault = bad
                     .map(|fault| (fault, Reaction::Brake))
                     .or_else(|| self.watch.endpoint().filter(|_| !self.is_off()))
-                    .or_else(|| self.unheard(measured.as_ref(), guard))
-                    .or_else(|| self.strays(measured.as_ref(), guard))
+                    .or_else(|| self.unheard(fresh.as_ref(), guard))
+                    .or_else(|| self.strays(fresh.as_ref(), guard))
+                    .or_else(|| self.unanswering(fresh.as_ref(), now_ns, guard))
                     .or((age >= guard.lost_ns)
-                        .then_some((Fault::CommunicationLost, Reaction::Brake)))
+                        .then_some((self.silence(now_ns, guard), Reaction::Brake)))
                     .or(low_rate.then_some((Fault::LowRate, Reaction::Brake)));
                 if let Some((fault, reaction)) = fault {
                     self.fail(fault, reaction, out);
@@ -45,9 +50,15 @@ impl State {
                 {
                     self.lapse(Fault::HeldJoint, Reason::HeldJoint, out);
                 }
-                self.follow_if_limp(guard, out);
+                self.follow_if_limp(now_ns, guard, out);
             }
         }
+    }
+
+    /// What it is when no usable state comes.
+    fn silence(&self, now_ns: u64, guard: &Guard) -> Fault {
+        let refusing = self.watch.is_refusing(now_ns, guard);
+        if refusing { Fault::Clock } else { Fault::CommunicationLost }
     }
 
     /// Latches a fault: every plan ends now, the arm slows down on its path or is followed.
@@ -89,50 +100,67 @@ impl State {
         self.watch.window_cycles = 0;
     }
 
-    /// Waits for a sound endpoint; meanwhile commands where the arm is, so that nothing jumps.
+    /// Waits for a sound endpoint that answers; meanwhile commands where the arm is, so that
+    /// nothing jumps.
     fn initialise(&mut self, bad: Option<Fault>, now_ns: u64, guard: &Guard) {
+        let clock = self.watch.is_refusing(now_ns, guard).then_some(Fault::Clock);
         let Some(measured) = self.watch.newest else {
-            self.fault = bad.unwrap_or(Fault::None);
+            self.fault = bad.or(clock).unwrap_or(Fault::None);
             return;
         };
         if self.has_position {
-            self.creep(&measured.q, guard);
+            self.creep(&measured.q, 0.0, guard);
         } else {
             self.q = measured.q;
             self.has_position = true;
         }
         let stale = self.watch.age(now_ns) >= guard.stale_ns;
+        let unanswered = !self.is_off() && self.is_unanswered(now_ns, guard);
         let trouble = bad
             .or(self.watch.endpoint().map(|(fault, _)| fault))
-            .or(stale.then_some(Fault::StaleState));
+            .or(clock)
+            .or(stale.then_some(Fault::StaleState))
+            .or(unanswered.then_some(Fault::Answer));
         self.fault = trouble.unwrap_or(Fault::None);
         let near =
             (0..guard.used().len()).all(|j| (self.q[j] - measured.q[j]).abs() <= HELD_WITHIN);
-        if trouble.is_none() && near {
+        let answers = self.watch.answered > 0 || self.is_off();
+        if trouble.is_none() && near && answers {
             self.mode = Mode::Hold;
             self.forget();
         }
     }
 
     /// Brings the command to where an arm is that does not follow it, so that it can begin to.
-    fn follow_if_limp(&mut self, guard: &Guard, out: &mut Output) {
+    fn follow_if_limp(&mut self, now_ns: u64, guard: &Guard, out: &mut Output) {
+        let Some(measured) = self.watch.newest else { return };
         let limp = match self.mode {
             // A fault stays latched when its cause is gone: with the motors on again the command
             // must stand, or a loaded arm sinks after its own sag.
             Mode::Fault => self.watch.is_limp(),
             _ => self.is_off(),
         };
-        if limp && let Some(measured) = self.watch.newest {
+        if limp {
             // Nothing brakes on the path any more.
             self.drop_path(out);
-            self.creep(&measured.q, guard);
+            self.creep(&measured.q, 0.0, guard);
+        } else if self.mode == Mode::Fault && self.path.is_none() {
+            let idle = measured.setpoint_sequence == 0 || self.is_unanswered(now_ns, guard);
+            if idle {
+                // It may follow all the same: near enough to begin, and no load sinks after its sag.
+                self.creep(&measured.q, HELD_WITHIN, guard);
+            }
         }
     }
 
-    /// Moves the commanded position towards a measured one, no faster than each joint may.
-    fn creep(&mut self, to: &JointVector, guard: &Guard) {
+    /// Moves the commanded position towards a measured one, no faster than each joint may, as far
+    /// as a joint is not within `near` of it.
+    fn creep(&mut self, to: &JointVector, near: f64, guard: &Guard) {
         for (j, bound) in guard.used().iter().enumerate() {
-            self.q[j] += limited(to[j] - self.q[j], bound.velocity() * guard.period());
+            let apart = to[j] - self.q[j];
+            if !(apart.abs() <= near) {
+                self.q[j] += limited(apart, bound.velocity() * guard.period());
+            }
         }
         self.v = JointVector::ZERO;
     }
@@ -151,30 +179,11 @@ impl State {
     }
 
     /// The endpoint hears no setpoints although they flow.
-    fn unheard(&mut self, measured: Option<&Measured>, guard: &Guard) -> Option<(Fault, Reaction)> {
-        if let Some(m) = measured {
+    fn unheard(&mut self, fresh: Option<&Measured>, guard: &Guard) -> Option<(Fault, Reaction)> {
+        if let Some(m) = fresh {
             let timeout = m.status & status::SETPOINT_TIMEOUT != 0 && !self.is_off();
             self.watch.unheard = if timeout { self.watch.unheard.saturating_add(1) } else { 0 };
         }
         (self.watch.unheard >= guard.debounce).then_some((Fault::Endpoint, Reaction::Follow))
-    }
-
-    /// The arm does not follow. Measured positions are compared with the setpoint that was in
-    /// force then, so a known delay is no error.
-    fn strays(&mut self, measured: Option<&Measured>, guard: &Guard) -> Option<(Fault, Reaction)> {
-        let behind = self.sequence.checked_sub(measured?.setpoint_sequence)?;
-        let heard = measured?.setpoint_sequence > 0;
-        if !heard || behind >= REMEMBERED as u64 || self.is_off() {
-            return None;
-        }
-        let newest = self.watch.newest?;
-        let slot = (newest.setpoint_sequence % REMEMBERED as u64) as usize;
-        let far = (0..guard.used().len()).any(|j| {
-            let speed = self.remembered_v[slot][j].abs();
-            let error = (self.remembered[slot][j] - newest.q[j]).abs();
-            !(error <= guard.following_error + guard.following_lag * speed)
-        });
-        self.watch.following = if far { self.watch.following.saturating_add(1) } else { 0 };
-        (self.watch.following >= guard.debounce).then_some((Fault::FollowingError, Reaction::Brake))
     }
 }

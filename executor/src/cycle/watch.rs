@@ -2,12 +2,18 @@
 
 use nullsweep_ipc_types::{Fault, status};
 
-use super::exchange::Measured;
+use super::exchange::{Measured, Refused};
+use crate::JointVector;
 use crate::guard::Guard;
 
 /// Windows whose mean rate is judged, and the length of each. \[ns\]
 const RATE_WINDOWS: usize = 3;
 const RATE_WINDOW_NS: u64 = 200_000_000;
+/// A stamp this far ahead of the cycle's own time is another clock's: a loop that was kept from
+/// running between its wake-up and its read finds stamps that are a little ahead. \[ns\]
+const AHEAD_NS: u64 = 5_000_000;
+/// A new state this far behind is another clock's too. \[ns\]
+const BEHIND_NS: u64 = 1_000_000_000;
 
 /// What supervision remembers.
 #[derive(Clone, Debug, Default)]
@@ -16,6 +22,9 @@ pub(super) struct Watch {
     pub(super) fresh_ns: u64,
     pub(super) following: u32,
     pub(super) unheard: u32,
+    /// The newest setpoint that a state has named and that can have been in force.
+    pub(super) answered: u64,
+    pub(super) refused: Refused,
     pub(super) window_start_ns: u64,
     pub(super) window_cycles: u32,
     pub(super) rates: [f64; RATE_WINDOWS],
@@ -40,23 +49,52 @@ impl Watch {
         if self.newest.is_some() { now_ns.saturating_sub(self.fresh_ns) } else { u64::MAX }
     }
 
-    /// Takes a state in; what is wrong with it. A stamp that does not rise is no new state.
-    pub(super) fn take(&mut self, measured: Measured, now_ns: u64, guard: &Guard) -> Option<Fault> {
-        if self.newest.is_some_and(|n| measured.stamp_ns <= n.stamp_ns) {
-            return None;
+    /// Takes a state in: whether it is a new one, or what is wrong with it. A stamp that does not
+    /// rise is no new state, and one of another clock must not keep later good ones out. Of a
+    /// continuous joint's whole turns those are taken that bring it nearest to `near`: an endpoint
+    /// may wrap its angles.
+    pub(super) fn take(
+        &mut self,
+        measured: Measured,
+        near: Option<&JointVector>,
+        now_ns: u64,
+        guard: &Guard,
+    ) -> Result<bool, Fault> {
+        let stamp_ns = measured.stamp_ns;
+        if self.newest.is_some_and(|n| stamp_ns <= n.stamp_ns) {
+            return Ok(false);
         }
+        if stamp_ns.saturating_sub(now_ns) > AHEAD_NS || now_ns.saturating_sub(stamp_ns) > BEHIND_NS
+        {
+            self.refused = Refused {
+                count: self.refused.count.saturating_add(1),
+                at_ns: now_ns,
+                ahead_ns: ahead(stamp_ns, now_ns),
+            };
+            return Ok(false);
+        }
+        self.refused.at_ns = 0;
         if measured.joint_count != guard.dof {
-            return Some(Fault::JointCount);
-        }
-        if !measured.q.iter().take(guard.dof).all(|q| q.is_finite()) {
-            return Some(Fault::NotFinite);
+            return Err(Fault::JointCount);
         }
         let mut own = measured;
         own.q.iter_mut().skip(guard.dof).for_each(|q| *q = 0.0);
+        if let Some(near) = near {
+            own.q = guard.continuous().nearest_turn(&own.q, near);
+        }
+        if !own.q.iter().all(|q| q.is_finite()) {
+            return Err(Fault::NotFinite);
+        }
         self.newest = Some(own);
         // A stamp from the future must not make a dead endpoint look alive.
-        self.fresh_ns = measured.stamp_ns.min(now_ns);
-        None
+        self.fresh_ns = stamp_ns.min(now_ns);
+        Ok(true)
+    }
+
+    /// Whether what comes is refused for its stamps.
+    pub(super) fn is_refusing(&self, now_ns: u64, guard: &Guard) -> bool {
+        let Refused { at_ns, .. } = self.refused;
+        at_ns > 0 && now_ns.saturating_sub(at_ns) < guard.lost_ns
     }
 
     /// What the endpoint says about itself.
@@ -73,12 +111,11 @@ impl Watch {
         }
     }
 
-    /// Whether the endpoint follows no setpoint now, as it says itself: it is not able to, it has
-    /// stopped by itself, or it has begun anew and had none yet that is near enough.
+    /// Whether the endpoint follows no setpoint now, as it says itself: it is not able to, or it
+    /// has stopped by itself.
     pub(super) fn is_limp(&self) -> bool {
-        let idle =
-            |m: Measured| m.status & status::SETPOINT_TIMEOUT != 0 || m.setpoint_sequence == 0;
-        self.endpoint().is_some() || self.newest.is_some_and(idle)
+        let stopped = |m: Measured| m.status & status::SETPOINT_TIMEOUT != 0;
+        self.endpoint().is_some() || self.newest.is_some_and(stopped)
     }
 
     /// Counts cycles in windows; whether the mean over all windows is too low.
@@ -100,4 +137,10 @@ impl Watch {
         let mean = self.rates.iter().sum::<f64>() / RATE_WINDOWS as f64;
         self.windows >= RATE_WINDOWS as u64 && !(mean >= guard.min_rate)
     }
+}
+
+/// How far a stamp is ahead of a time. \[ns\]
+fn ahead(stamp_ns: u64, now_ns: u64) -> i64 {
+    let apart = i64::try_from(stamp_ns.abs_diff(now_ns)).unwrap_or(i64::MAX);
+    if stamp_ns > now_ns { apart } else { -apart }
 }

@@ -15,7 +15,7 @@ use crate::interpolate::PlanKnot;
 use crate::{JointVector, MAX_DOF};
 
 /// The first bytes of a recording; the digit is the version.
-pub(crate) const MAGIC: &[u8; 8] = b"NSWREC3\n";
+pub(crate) const MAGIC: &[u8; 8] = b"NSWREC4\n";
 
 /// What a record holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +76,9 @@ pub(crate) struct GuardRecord {
     stale_ns: u64,
     lost_ns: u64,
     debounce: u64,
+    settle_ns: u64,
+    goal_ns: u64,
+    goal_tolerance: f64,
     /// In the order of [`Guard`]'s fields.
     bounds: [f64; 7],
 }
@@ -94,6 +97,9 @@ impl From<&Guard> for GuardRecord {
             stale_ns: g.stale_ns,
             lost_ns: g.lost_ns,
             debounce: u64::from(g.debounce),
+            settle_ns: g.settle_ns,
+            goal_ns: g.goal_ns,
+            goal_tolerance: g.goal_tolerance,
             bounds: [
                 g.stop_acceleration,
                 g.connector_acceleration,
@@ -120,6 +126,9 @@ impl From<&GuardRecord> for Guard {
             stale_ns: r.stale_ns,
             lost_ns: r.lost_ns,
             debounce: u32::try_from(r.debounce).unwrap_or(u32::MAX),
+            settle_ns: r.settle_ns,
+            goal_ns: r.goal_ns,
+            goal_tolerance: r.goal_tolerance,
             stop_acceleration: stop,
             connector_acceleration: connector,
             start_tolerance: start,

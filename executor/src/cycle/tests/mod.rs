@@ -1,9 +1,13 @@
 //! States and events, the join rules, and supervision, on a virtual clock.
 
+mod answers;
+mod clocks;
 mod faults;
+mod goals;
 mod joins;
 mod motion;
 mod tables;
+mod turns;
 
 use EventKind::{Aborted, Accepted, Finished, Rejected, Started, Superseded};
 use nullsweep_ipc_types::{

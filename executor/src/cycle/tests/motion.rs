@@ -18,6 +18,9 @@ fn runs_a_plan_to_its_exact_end() {
         sim.run(398);
         assert_eq!(sim.mode(), Mode::Executing);
         sim.run(1);
+        assert_eq!(sim.last, Some(points[8].1), "the last knot is commanded");
+        assert_eq!(sim.story(1), [Accepted, Started], "but the arm has not settled there yet");
+        sim.run(51);
         assert_eq!(sim.story(1), [Accepted, Started, Finished], "{kind}");
         assert_eq!(sim.mode(), Mode::Hold);
         assert_eq!(sim.last, Some(points[8].1), "the last knot is hit bit for bit");
@@ -179,7 +182,7 @@ fn plans_wait_in_line_and_the_newest_wins() {
     }
     let full = sim.offer(plan(&guard, 6, JoinRule::AfterCurrent, &back));
     assert_eq!(only(&full, Rejected).why.reason, Reason::QueueFull);
-    sim.run(400);
+    sim.run(460);
     assert_eq!(sim.story(1), [Accepted, Started, Finished]);
     assert_eq!(sim.story(2), [Accepted, Started]);
     let at = back[4].1;
