@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use nullsweep_ipc_types::{JointStates, MAX_HELD_JOINTS, Setpoint, status};
-use nullsweep_robot::{Arm, JointVector};
+use nullsweep_robot::{Arm, Continuous, JointVector, wrap};
 use serde::Serialize;
 
 use crate::fault::{FaultAt, FaultKind};
@@ -30,6 +30,8 @@ pub struct Behaviour {
     pub fidelity: Fidelity,
     /// For the mechanism, see [`Mechanism::with_payload`]. \[N·m\]
     pub payload: f64,
+    /// Whether it tells the angles of continuous joints in (−π, π], as some robots do.
+    pub wrap: bool,
     /// What the judge allows; its `session_timeout_ns` is also the endpoint's own watchdog.
     pub rules: Rules,
     /// Faults to play.
@@ -52,6 +54,7 @@ pub struct Counters {
 /// A simulated arm behind the setpoint and state services.
 pub struct Endpoint {
     dof: usize,
+    continuous: Continuous,
     behaviour: Behaviour,
     started_ns: u64,
     plant: Box<dyn Plant>,
@@ -98,6 +101,7 @@ impl Endpoint {
         };
         Ok(Self {
             dof: arm.dof(),
+            continuous: Continuous::of(arm.limits()),
             started_ns: now_ns,
             plant,
             judge: Judge::new(arm, behaviour.rules.clone()),
@@ -189,8 +193,18 @@ impl Endpoint {
         if active(FaultKind::Nan) {
             positions[0] = f64::NAN;
         }
-        let stamp_ns =
-            if active(FaultKind::Delay) { now_ns.saturating_sub(10_000_000) } else { now_ns };
+        if self.behaviour.wrap {
+            for j in (0..self.dof).filter(|j| self.continuous.is(*j)) {
+                positions[j] = wrap(positions[j]);
+            }
+        }
+        let stamp_ns = if active(FaultKind::Delay) {
+            now_ns.saturating_sub(10_000_000)
+        } else if active(FaultKind::Clock) {
+            now_ns + FaultKind::CLOCK_AHEAD.as_nanos() as u64
+        } else {
+            now_ns
+        };
         let joint_count = self.dof as u32 - u32::from(active(FaultKind::Count));
         if active(FaultKind::Freeze) {
             positions = *self.frozen.get_or_insert(positions);
@@ -209,6 +223,7 @@ impl Endpoint {
             state.setpoint_sequence = setpoint.sequence;
             state.setpoint_received_ns = setpoint.received_ns;
         }
+        state.setpoint_sequence = self.answer(state.setpoint_sequence, now_ns);
         state.positions[..self.dof].copy_from_slice(&positions[..self.dof]);
         state.velocities[..self.dof].copy_from_slice(&velocities[..self.dof]);
         state.efforts[..self.dof].copy_from_slice(&self.plant.efforts()[..self.dof]);
@@ -218,6 +233,16 @@ impl Endpoint {
         state.status = bits;
         self.counters.states += 1;
         Some(state)
+    }
+
+    /// What it says of the setpoint that is in force.
+    fn answer(&self, in_force: u64, now_ns: u64) -> u64 {
+        match |kind| self.is_active(kind, now_ns) {
+            active if active(FaultKind::Unanswered) => 0,
+            active if active(FaultKind::Stuck) => 1,
+            active if active(FaultKind::Ahead) => in_force + 1_000_000,
+            _ => in_force,
+        }
     }
 
     fn is_active(&self, kind: FaultKind, now_ns: u64) -> bool {
@@ -253,6 +278,9 @@ impl Endpoint {
             self.plant.release();
         }
         self.disabled = setpoint.disable != 0;
+        // Whole turns of a joint that turns without end are no way to go.
+        let near = self.nearest(setpoint);
+        let setpoint = &near;
         let able = !self.disabled
             && !self.is_active(FaultKind::Halt, now_ns)
             && !self.is_active(FaultKind::Deaf, now_ns);
@@ -267,6 +295,15 @@ impl Endpoint {
         if able {
             self.plant.follow(setpoint);
         }
+    }
+
+    /// The setpoint with its continuous joints by whole turns nearest to where the arm is.
+    fn nearest(&self, setpoint: &Setpoint) -> Setpoint {
+        let (mut near, mut q) = (*setpoint, JointVector::default());
+        q[..self.dof].copy_from_slice(&setpoint.positions[..self.dof]);
+        q = self.continuous.nearest_turn(&q, self.plant.measured());
+        near.positions[..self.dof].copy_from_slice(&q[..self.dof]);
+        near
     }
 
     /// Whether the arm is where a setpoint wants it.

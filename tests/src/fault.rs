@@ -31,6 +31,14 @@ pub enum FaultKind {
     /// The link to the motors is cut: nothing reaches them, their encoders stand, and after
     /// [`FaultKind::LINK_TIMEOUT`] they halt by themselves until it is back.
     Link,
+    /// States name no setpoint that was in force.
+    Unanswered,
+    /// States name setpoint 1 as the one in force, as of a process that reads no more.
+    Stuck,
+    /// States name a setpoint that was never sent.
+    Ahead,
+    /// States are stamped by another clock, which is far ahead as `CLOCK_REALTIME` is.
+    Clock,
 }
 
 impl FaultKind {
@@ -38,9 +46,11 @@ impl FaultKind {
     pub const JUMP: f64 = 0.3;
     /// How long the PR2's motors stay on without communication.
     pub const LINK_TIMEOUT: Duration = Duration::from_millis(100);
+    /// How far the other clock is ahead.
+    pub const CLOCK_AHEAD: Duration = Duration::from_secs(1_764_000_000);
 
     /// Every kind with its name on the command line.
-    pub const NAMES: [(Self, &'static str); 12] = [
+    pub const NAMES: [(Self, &'static str); 16] = [
         (Self::Halt, "halt"),
         (Self::Error, "error"),
         (Self::Uncalibrated, "uncalibrated"),
@@ -53,6 +63,10 @@ impl FaultKind {
         (Self::Count, "count"),
         (Self::Deaf, "deaf"),
         (Self::Link, "link"),
+        (Self::Unanswered, "unanswered"),
+        (Self::Stuck, "stuck"),
+        (Self::Ahead, "ahead"),
+        (Self::Clock, "clock"),
     ];
 
     /// Its name on the command line.

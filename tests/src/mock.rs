@@ -53,6 +53,9 @@ struct Args {
     /// With --fidelity mechanism: effort on the shoulder lift of a weight in the hand, in N·m
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_name = "NM")]
     payload: f64,
+    /// Tell the angles of continuous joints in (−π, π]
+    #[arg(long)]
+    wrap: bool,
     /// End after so many seconds
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -139,6 +142,7 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
     let behaviour = Behaviour {
         fidelity: args.fidelity,
         payload: args.payload,
+        wrap: args.wrap,
         rules,
         faults: args.fault.clone(),
     };

@@ -34,6 +34,29 @@ fn the_mock_keeps_every_rule() {
     }
 }
 
+/// One that wraps its angles keeps them too, with the wrists at either side of half a turn.
+#[test]
+fn a_mock_that_wraps_its_angles_keeps_every_rule() {
+    for fidelity in [Fidelity::Servo, Fidelity::Mechanism] {
+        for near in [-0.03, 0.03] {
+            let (arm, clock) = (right_arm(), VirtualClock::default());
+            let mut at = arm.home();
+            for (j, limits) in arm.limits().iter().enumerate().filter(|(_, l)| l.continuous) {
+                assert!(limits.continuous);
+                at[j] = std::f64::consts::PI + near;
+            }
+            let behaviour = Behaviour { fidelity, wrap: true, ..Behaviour::default() };
+            let endpoint = Endpoint::new(&arm, at, behaviour, clock.now_ns()).expect("a PR2 arm");
+            let mut rig = Rig::new(VirtualEndpoint::new(endpoint, clock.clone()), clock, &arm);
+            let broken: Vec<_> = suite(&mut rig, &Terms::default(), |_| true)
+                .into_iter()
+                .filter_map(|f| Some((f.name, f.broken?)))
+                .collect();
+            assert!(broken.is_empty(), "{fidelity:?} {near}: {broken:?}");
+        }
+    }
+}
+
 #[test]
 fn a_broken_endpoint_breaks_its_own_rule() {
     for (fault, rule) in [
@@ -44,6 +67,10 @@ fn a_broken_endpoint_breaks_its_own_rule() {
         ("stale@0s", "shape"),
         ("freeze@0s", "follow"),
         ("deaf@0s", "follow"),
+        ("unanswered@0s", "answer"),
+        ("stuck@0s", "answer"),
+        ("ahead@0s", "answer"),
+        ("clock@0s", "stream"),
     ] {
         let faults = vec![fault.parse().expect("a fault")];
         let broken = broken_by(Behaviour { faults, ..Behaviour::default() });

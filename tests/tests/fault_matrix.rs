@@ -22,6 +22,8 @@ fn expected(kind: FaultKind) -> (Option<Fault>, Option<Fault>) {
         FaultKind::Nan => both(Fault::NotFinite),
         FaultKind::Count => both(Fault::JointCount),
         FaultKind::Jump => both(Fault::FollowingError),
+        FaultKind::Unanswered | FaultKind::Stuck | FaultKind::Ahead => both(Fault::Answer),
+        FaultKind::Clock => both(Fault::Clock),
         // An arm that stands does not show that its encoders stand too.
         FaultKind::Freeze | FaultKind::Deaf => (None, Some(Fault::FollowingError)),
         FaultKind::Drop | FaultKind::Delay => (None, None),
@@ -89,9 +91,14 @@ fn matrix(fidelity: Fidelity) {
             let (at_rest, moving) = expected(kind);
             match if moves { moving } else { at_rest } {
                 // While it waits, it does not start; while it is latched, it stays so. A cut link
-                // shows only after it has started.
+                // or a stuck answer shows only after it has started.
+                Some(_) if mode == Mode::Init && kind == FaultKind::Jump => {
+                    // It jumps before it has answered a setpoint: that is where it is begun with.
+                    assert_eq!((after.mode, after.fault), (Mode::Hold, Fault::None), "{name}");
+                }
                 Some(_)
-                    if mode == Mode::Init && !matches!(kind, FaultKind::Jump | FaultKind::Link) =>
+                    if mode == Mode::Init
+                        && !matches!(kind, FaultKind::Link | FaultKind::Stuck) =>
                 {
                     assert_eq!(after.mode, Mode::Init, "{name}");
                 }
@@ -141,6 +148,62 @@ fn every_fault_in_every_mode_with_a_servo() {
 #[test]
 fn every_fault_in_every_mode_with_a_mechanism() {
     matrix(Fidelity::Mechanism);
+}
+
+/// A process that no longer reads, but goes on sending states: the arm stands while the setpoints
+/// move on, and the states tell whatever. No plan is finished, and when the process reads again it
+/// is not commanded away in one cycle.
+#[test]
+fn an_endpoint_that_reads_no_more_finishes_nothing_and_is_not_jerked() {
+    for fidelity in [Fidelity::Servo, Fidelity::Mechanism] {
+        for lie in [FaultKind::Unanswered, FaultKind::Stuck, FaultKind::Ahead] {
+            let (mut system, plan) = in_mode(Mode::Executing, fidelity);
+            let now = system.now_ns();
+            for kind in [FaultKind::Deaf, lie] {
+                system.endpoint.play(kind, Some(Duration::from_secs(3)), now);
+            }
+            let name = format!("{} with a {fidelity:?}", lie.name());
+            system.run(2990);
+            let story = system.story(plan.expect("it executes"));
+            let end = story.last().map(|e| e.kind);
+            assert_eq!(end, Some(EventKind::Aborted), "{name}: {story:?}");
+            let after = system.snapshot();
+            assert_eq!((after.mode, after.fault), (Mode::Fault, Fault::Answer), "{name}");
+            let (commanded, there) = (system.commanded(), *system.endpoint.positions());
+            for j in 0..system.arm.dof() {
+                let apart = (commanded[j] - there[j]).abs();
+                assert!(apart < 0.02, "{name}: joint {j} is commanded {apart} away");
+            }
+            recovers(&mut system, &name, Mode::Executing);
+        }
+    }
+}
+
+/// An endpoint that keeps its angles within a turn, on a way through ±π and from there on.
+#[test]
+fn an_arm_that_wraps_its_angles_sweeps_through_half_a_turn() {
+    for fidelity in [Fidelity::Servo, Fidelity::Mechanism] {
+        let arm = right_arm();
+        let behaviour = Behaviour { fidelity, wrap: true, ..Behaviour::default() };
+        let mut system = Loopback::new(&arm, behaviour).expect("a PR2 arm");
+        system.run(10);
+        let wrist = arm.dof() - 1;
+        assert!(arm.limits()[wrist].continuous);
+        for by in [4.0, -8.0] {
+            let from = system.commanded();
+            let mut to = from;
+            to[wrist] += by;
+            let sketch = Sketch::through(&arm, &[from, to], 0.3);
+            let plan = system.publish(&sketch).expect("a sound plan");
+            system.run((sketch.seconds() * 1e3) as u32 + 1500);
+            let story = system.story(plan);
+            let end = story.last().map(|e| e.kind);
+            assert_eq!(end, Some(EventKind::Finished), "{fidelity:?} by {by}: {story:?}");
+            assert!((system.endpoint.positions()[wrist] - to[wrist]).abs() < 0.02);
+        }
+        let verdict = system.endpoint.judge().verdict();
+        assert_eq!(verdict.total(), 0, "{fidelity:?}: {:?}", verdict.first);
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use nullsweep_executor::Hardware;
 use nullsweep_ipc_types::ports::PortError;
 use nullsweep_ipc_types::{JointStates, status};
-use nullsweep_robot::JointVector;
+use nullsweep_robot::{Continuous, JointVector};
 
 use super::rig::{Clock, Command, PERIOD_NS, Rig};
 
@@ -119,10 +119,9 @@ impl<H: Hardware, C: Clock> Rig<H, C> {
 
     /// The joint that is farthest from `q`, and how far.
     fn farthest(&self, q: &JointVector) -> (usize, f64) {
-        let at = self.measured();
-        let off = |j: usize| (at[j] - q[j]).abs();
+        let off = Continuous::of(self.arm.limits()).displacement(&self.measured(), q);
         (0..self.arm.dof())
-            .map(|j| (j, off(j)))
+            .map(|j| (j, off[j]))
             .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
     }
 
@@ -263,8 +262,9 @@ fn follow<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<(
             there.q[j] += to;
             rig.keep(&there, ms(300))?;
             rig.near(&there.q, terms.tolerance, &format!("after joint {j} moved by {angle:.3}"))?;
-            let moved = (rig.measured()[j] - home[j] - to).abs();
-            if moved > 0.5 * terms.angle {
+            let missing =
+                Continuous::of(rig.arm.limits()).displacement(&rig.measured(), &there.q)[j];
+            if missing > 0.5 * terms.angle {
                 return broken(format!("{} does not move", rig.arm.joint_names()[j]));
             }
         }

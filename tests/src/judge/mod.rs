@@ -7,7 +7,7 @@
 mod verdict;
 
 use nullsweep_ipc_types::{Mode, PlanId, Setpoint, service};
-use nullsweep_robot::{Arm, JointVector};
+use nullsweep_robot::{Arm, Continuous, JointVector};
 
 pub use verdict::{Kind, PlanRun, Verdict, Violation};
 
@@ -206,8 +206,9 @@ impl Judge {
 
     /// The joint that is farthest from where it is measured, if that is too far to begin.
     fn worst_start(&self, q: &JointVector, measured: &JointVector) -> Option<(usize, f64)> {
+        let apart = Continuous::of(self.arm.limits()).displacement(q, measured);
         (0..self.arm.dof())
-            .map(|j| (j, (q[j] - measured[j]).abs()))
+            .map(|j| (j, apart[j]))
             .filter(|(_, off)| *off > self.rules.start_tolerance)
             .max_by(|a, b| a.1.total_cmp(&b.1))
     }
