@@ -257,6 +257,7 @@ mod tests {
 
     use super::*;
     use crate::JointVector;
+    use crate::cycle::Refused;
 
     fn words() -> (Words, Guard) {
         let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
@@ -282,6 +283,7 @@ mod tests {
             scale: 1.0,
             commanded: JointVector::ZERO,
             measured: JointVector::ZERO,
+            refused: Refused::default(),
         }
     }
 

@@ -50,7 +50,7 @@ pub fn step(state: &mut State, input: Input, now_ns: u64, guard: &Guard) -> Outp
         state.consider(plan, now_ns, guard, &mut out);
     }
     state.advance(now_ns, guard, &mut out);
-    state.emit(guard, &mut out);
+    state.emit(&mut out);
     out
 }
 
