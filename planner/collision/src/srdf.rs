@@ -6,6 +6,9 @@ use quick_xml::Reader;
 use quick_xml::events::attributes::AttrError;
 use quick_xml::events::{BytesStart, Event};
 
+/// How deep elements may be nested, as in a URDF: an SRDF's own go 3 deep.
+const DEPTH: usize = 128;
+
 /// Why an SRDF cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SrdfError {
@@ -80,6 +83,12 @@ fn parse(text: &str) -> Result<Srdf, String> {
         let element = match &event {
             Event::Start(e) => {
                 depth += 1;
+                if depth > DEPTH {
+                    return Err(format!(
+                        "<{}> near byte {at} is nested more than {DEPTH} deep: no SRDF is",
+                        e.name().as_ref()
+                    ));
+                }
                 e
             }
             Event::Empty(e) => e,
@@ -158,6 +167,14 @@ mod tests {
         assert!(parse(r#"<robot><disable_collisions link1="a"/></robot>"#).is_err());
         assert!(parse("<robot><disable").is_err());
         assert!(parse("<robot>").is_err());
+    }
+
+    #[test]
+    fn deep_nesting_is_refused() {
+        let nested = |depth: usize| "<r>".repeat(depth) + &"</r>".repeat(depth);
+        parse(&nested(128)).unwrap();
+        let why = parse(&nested(129)).unwrap_err();
+        assert_eq!(why, "<r> near byte 384 is nested more than 128 deep: no SRDF is");
     }
 
     #[test]
