@@ -5,6 +5,7 @@
 //! distance. What the grid cannot prove is decided on the raw points, kept in cells.
 
 use nalgebra::{Point3, Vector3};
+use nullsweep_grid::Cells;
 use wide::f32x8;
 
 use crate::frame::Frame;
@@ -14,6 +15,7 @@ use crate::solid::Solid;
 /// The points that the moving links can reach, in the root frame.
 #[derive(Debug, Default)]
 pub(crate) struct Field {
+    /// In the order of the cells.
     points: Vec<Vector3<f64>>,
     /// The same less `min`, eight at a time; beyond the last one far away. \[m\]
     lanes: Vec<[f32x8; 3]>,
@@ -26,10 +28,8 @@ pub(crate) struct Field {
     fine: Grid,
     /// Nodes of the fine grid without a point this near hold this value. \[m\]
     fine_cap: f64,
-    /// Cells of the points: nodes are the cells' centres, distances are not kept.
-    cells: Grid,
-    /// First point of each cell; one more at the end.
-    starts: Vec<u32>,
+    /// Where the points are.
+    cells: Cells,
 }
 
 /// Nodes of a regular grid and their distances.
@@ -65,15 +65,13 @@ const ROUNDING: f64 = 2e-6;
 impl Field {
     /// Keeps the finite points within `reach` of `centre` (what lies beyond can never be touched).
     pub(crate) fn new(scan: &[Point3<f64>], centre: &Vector3<f64>, reach: f64) -> Self {
-        let mut points: Vec<Vector3<f64>> =
-            scan.iter().map(|p| p.coords).filter(|p| (p - centre).norm() <= reach).collect();
-        if points.is_empty() {
-            return Self::default();
-        }
-        let (mut min, mut max) = (points[0], points[0]);
-        for p in &points {
-            min = min.inf(p);
-            max = max.sup(p);
+        let near = |p: &&Point3<f64>| (p.coords - centre).norm() <= reach;
+        let kept: Vec<Point3<f64>> = scan.iter().filter(near).copied().collect();
+        let Some(first) = kept.first() else { return Self::default() };
+        let (mut min, mut max) = (first.coords, first.coords);
+        for p in &kept {
+            min = min.inf(&p.coords);
+            max = max.sup(&p.coords);
         }
         let extent = max - min;
         let spaced = |h: f64| {
@@ -85,9 +83,8 @@ impl Field {
             h *= 1.1;
         }
         let mut fine = Grid::new(min, max, h, (BAND + 1) as f64 * h);
-        let mut cells = Grid::new(min, max, CELL * h, CELL * h);
-        let starts = sort_into_cells(&cells, &mut points);
-        cells.distance = Vec::new();
+        let (cells, order) = Cells::new(&kept, CELL * h);
+        let points: Vec<_> = order.iter().map(|&i| kept[i as usize].coords).collect();
         let fine_cap = (BAND as f64 + 0.5) * h;
         fine.scatter(&points, fine_cap);
         let coarse = Grid::coarse(min, max, h, &points);
@@ -102,7 +99,7 @@ impl Field {
             .collect();
         // A hundred roundings of a coordinate.
         let rounding = 1e-5 * (1.0 + extent.norm());
-        Self { points, lanes, rounding, min, max, coarse, fine, fine_cap, cells, starts }
+        Self { points, lanes, rounding, min, max, coarse, fine, fine_cap, cells }
     }
 
     /// The points kept.
@@ -139,32 +136,20 @@ impl Field {
         let (low, high) = solid.bounds();
         let centre = at.apply(&(0.5 * (low + high)));
         let half = at.rotation.abs() * (0.5 * (high - low)) + Vector3::repeat(need);
-        let (min, max) = (centre - half, centre + half);
-        if self.points.is_empty() || (0..3).any(|i| min[i] > self.max[i] || max[i] < self.min[i]) {
-            return true;
-        }
         let sieve = Sieve::new(solid, at, &self.min, need);
-        let grid = &self.cells;
-        let (low, high) = (grid.clamped_cell(&min), grid.clamped_cell(&max));
-        // Rows come in the order of their points, and the end of one may share its eight with the
-        // start of the next.
+        // Runs ascend, and the end of one may share its eight with the start of the next.
         let mut done = 0;
-        for z in low[2]..=high[2] {
-            for y in low[1]..=high[1] {
-                let row = (z * grid.size[1] + y) * grid.size[0];
-                let from = self.starts[row + low[0]] as usize;
-                let to = self.starts[row + high[0] + 1] as usize;
-                let eights = done.max(from / 8)..to.div_ceil(8);
-                done = done.max(eights.end);
-                for eight in eights {
-                    let mut near = sieve.near(&self.lanes[eight]);
-                    while near != 0 {
-                        let point = self.points.get(8 * eight + near.trailing_zeros() as usize);
-                        if point.is_some_and(|p| !test(p)) {
-                            return false;
-                        }
-                        near &= near - 1;
+        for run in self.cells.between(&(centre - half).into(), &(centre + half).into()) {
+            let eights = done.max(run.start / 8)..run.end.div_ceil(8);
+            done = done.max(eights.end);
+            for eight in eights {
+                let mut near = sieve.near(&self.lanes[eight]);
+                while near != 0 {
+                    let point = self.points.get(8 * eight + near.trailing_zeros() as usize);
+                    if point.is_some_and(|p| !test(p)) {
+                        return false;
                     }
+                    near &= near - 1;
                 }
             }
         }
@@ -279,30 +264,6 @@ impl Grid {
         let distance = self.distance[(z * self.size[1] + y) * self.size[0] + x];
         f64::from(distance) - (p - self.node(x, y, z)).norm()
     }
-}
-
-/// Sorts the points by the grid's cells; returns where each cell's points start.
-fn sort_into_cells(grid: &Grid, points: &mut Vec<Vector3<f64>>) -> Vec<u32> {
-    let cell_of = |p: &Vector3<f64>| {
-        let [x, y, z] = grid.clamped_cell(p);
-        (z * grid.size[1] + y) * grid.size[0] + x
-    };
-    let cells: Vec<usize> = points.iter().map(cell_of).collect();
-    let mut starts = vec![0u32; grid.distance.len() + 1];
-    for &cell in &cells {
-        starts[cell + 1] += 1;
-    }
-    for i in 1..starts.len() {
-        starts[i] += starts[i - 1];
-    }
-    let mut next = starts.clone();
-    let mut sorted = vec![Vector3::zeros(); points.len()];
-    for (p, &cell) in points.iter().zip(&cells) {
-        sorted[next[cell] as usize] = *p;
-        next[cell] += 1;
-    }
-    *points = sorted;
-    starts
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use nullsweep_grid::Cells;
 
 use crate::fit::{HeightFit, PlaneFit, weight};
 use crate::grid::Grid;
@@ -73,12 +74,12 @@ impl Surface {
     pub fn new(scan: &Scan) -> Self {
         let radius = FIT_RADIUS.max(4.0 * scan.spacing);
         let raw_radius = RAW_RADIUS.max(4.0 * scan.spacing);
-        // In the grid's own order neighbours lie together in memory.
-        let order = Grid::new(&scan.points, radius).order();
-        let points: Vec<_> = order.iter().map(|&i| scan.points[i]).collect();
-        let raw_order = Grid::new(&scan.raw, raw_radius).order();
-        let raw: Vec<_> = raw_order.iter().map(|&i| scan.raw[i]).collect();
-        let normals: Vec<_> = order.iter().map(|&i| scan.normals[i]).collect();
+        // In the cells' order neighbours lie together in memory.
+        let (_, order) = Cells::new(&scan.points, radius);
+        let points: Vec<_> = order.iter().map(|&i| scan.points[i as usize]).collect();
+        let (_, raw_order) = Cells::new(&scan.raw, raw_radius);
+        let raw: Vec<_> = raw_order.iter().map(|&i| scan.raw[i as usize]).collect();
+        let normals: Vec<_> = order.iter().map(|&i| scan.normals[i as usize]).collect();
         let grid = Grid::new(&points, radius);
         let widening = (noise(&grid, &points, &normals, radius) / NOISE).sqrt();
         let radius = radius * widening.clamp(1.0, WIDEST);
@@ -86,7 +87,7 @@ impl Surface {
             grid: Grid::new(&points, radius),
             normals,
             raw_grid: Grid::new(&raw, raw_radius),
-            raw_normals: raw_order.iter().map(|&i| scan.normals[i]).collect(),
+            raw_normals: raw_order.iter().map(|&i| scan.normals[i as usize]).collect(),
             raw,
             radius,
             raw_radius,

@@ -28,8 +28,9 @@ pub(crate) const CRATES: &[Crate] = &[
     leaf("ipc-types"),
     leaf("robot"),
     leaf("planner/gtsp"),
-    leaf("planner/surface"),
-    with("planner/collision", &["robot"]),
+    leaf("planner/grid"),
+    with("planner/surface", &["planner/grid"]),
+    with("planner/collision", &["planner/grid", "robot"]),
     with(
         "planner",
         &["ipc-types", "robot", "planner/gtsp", "planner/surface", "planner/collision"],
