@@ -147,7 +147,7 @@ fn joints(area: &Area<'_>, setting: &Setting, runs: &[(Method, MethodRun)]) -> D
     Ok(())
 }
 
-/// PathFigures 6 and 7: the paths of the methods side by side.
+/// Figures 6 and 7: the paths of the methods side by side.
 fn paths(area: &Area<'_>, setting: &Setting, runs: &[(Method, MethodRun)], view: &View) -> Drawn {
     for (panel, (method, run)) in area.split_evenly((1, runs.len().max(1))).iter().zip(runs) {
         caption(panel, label(*method))?;

@@ -22,14 +22,14 @@ pub(super) fn points_of(scan: &Scan, patches: &[Patch], marked: &[bool]) -> Vec<
 }
 
 /// Which points the plan that a job goes on from, and those that led to it, have swept by where the
-/// arm comes to `rest` on it, or else by its knot.
+/// arm comes to `rest` on it, or else by its knot; nothing where it is to be swept again.
 pub(super) fn swept_before(
     job: &Job,
     rest: Option<&Rest>,
     arm: &Arm,
     scan: &Scan,
 ) -> Result<Vec<bool>, PipelineError> {
-    let Some(After { plan, knot, .. }) = &job.after else {
+    let Some(After { plan, knot, again: false, .. }) = &job.after else {
         return Ok(vec![false; scan.points.len()]);
     };
     let (knots, knot) = (plan.knots.len(), rest.map_or(*knot, |rest| rest.at));
