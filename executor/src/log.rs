@@ -4,6 +4,9 @@
 //! from his answer nor a plan from its admission. So threads put whole lines into a buffer of
 //! fixed size, and a thread of the log's own writes them. What finds no room there or cannot be
 //! written is lost, counted, and told as soon as something can be written again.
+//!
+//! tracing-appender's non-blocking writer would be the crate for it, but its lines are allocated by
+//! one thread and freed by another, and it does not count what the sink refuses.
 
 use std::collections::VecDeque;
 use std::fs::File;

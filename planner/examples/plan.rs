@@ -1,4 +1,4 @@
-//! A scan becomes a plan file: of the file that is named, or of a simulated chair.
+//! Plans how the scan in a file, or a simulated chair, is swept, and writes plan.json.
 //!
 //! `cargo run --release -p nullsweep-planner --example plan -- [SCAN.pcd]`
 

@@ -1,5 +1,7 @@
 //! Arms that are not the PR2's sweep the seat of the simulated chair.
 
+mod common;
+
 use std::path::{Path, PathBuf};
 
 use nullsweep_collision::Options;
@@ -70,15 +72,9 @@ fn on_flange() -> Tool {
     toml::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
 }
 
-fn seat() -> Scene {
-    let view = simulate::chair(1);
-    let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
-    clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default()).unwrap().into()
-}
-
 /// Plans from a stance, or from the best of a few.
 fn plan(robot: &Robot, spec: &ArmSpec, tool: Tool, base: Option<[f64; 3]>) -> Outcome {
-    let seat = seat();
+    let seat = common::seat();
     let stance = match base {
         Some(base) => StanceChoice::Given(Stance { base, held: Vec::new() }),
         None => {

@@ -3,6 +3,8 @@
 //! A change that is meant to change plans takes the new digests over, which a failing run prints,
 //! and says so in its commit.
 
+mod common;
+
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -176,21 +178,10 @@ fn a_stance_is_chosen_as_ever() {
     }
 }
 
-/// Poses on a dome before the PR2: z into it, x upwards.
 #[test]
 fn given_poses_are_planned_as_ever() {
     if !comparable() {
         return;
-    }
-    let mut poses = Vec::new();
-    for i in -2..=2 {
-        for k in -2..=2 {
-            let (yaw, pitch) = (0.15 * f64::from(i), 0.15 * f64::from(k));
-            let outward = UnitQuaternion::from_euler_angles(0.0, pitch, yaw) * -Vector3::x();
-            let at = Vector3::new(0.95, -0.3, 0.85) + outward * 0.3;
-            let frame = UnitQuaternion::face_towards(&-outward, &Vector3::y());
-            poses.push(Isometry3::from_parts(Translation3::from(at), frame));
-        }
     }
     let config = TaskConfig {
         arm: ArmSpec::pr2(Side::Right),
@@ -204,7 +195,7 @@ fn given_poses_are_planned_as_ever() {
         trials: 10,
         seed: 1,
     };
-    let outcome = task::run(&Robot::pr2(), &poses, &config, &Silent).expect("a plan");
+    let outcome = task::run(&Robot::pr2(), &common::dome(), &config, &Silent).expect("a plan");
     assert_golden(
         &[("dome".into(), outcome.plan.digest().expect("short enough"))],
         &[("dome", 0x82e9_079d_03be_1879)],

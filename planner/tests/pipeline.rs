@@ -1,5 +1,7 @@
 //! The whole way from a simulated scan to a plan file.
 
+mod common;
+
 use nullsweep_planner::pipeline::{After, Job, Outcome, StanceChoice, run};
 use nullsweep_planner::plan::{CostKind, Method, Plan, PlanError, Profile};
 use nullsweep_planner::progress::Silent;
@@ -7,15 +9,6 @@ use nullsweep_planner::sweep::{contact_motion, coverage};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::Stance;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
-use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
-
-fn seat() -> Scene {
-    let view = simulate::chair(1);
-    let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
-    clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default())
-        .expect("the seat is there")
-        .into()
-}
 
 fn job(method: Method, cost: CostKind) -> Job {
     let held = vec![("torso_lift_joint".to_owned(), 0.1)];
@@ -44,7 +37,7 @@ fn check(outcome: &Outcome) {
 
 #[test]
 fn the_same_seed_gives_the_same_plan_whatever_the_number_of_threads() {
-    let seat = seat();
+    let seat = common::seat();
     let job = job(Method::Curvature, CostKind::Time);
     let (one, two) = (plan_on(1, &seat, &job), plan_on(2, &seat, &job));
     check(&one);
@@ -54,7 +47,7 @@ fn the_same_seed_gives_the_same_plan_whatever_the_number_of_threads() {
 
 #[test]
 fn a_plan_goes_on_from_a_knot_and_survives_its_file() {
-    let seat = seat();
+    let seat = common::seat();
     let first = plan_on(2, &seat, &job(Method::Tsp, CostKind::Effort));
     check(&first);
 
@@ -132,7 +125,7 @@ fn worst_sample(plan: &Plan, arm: &Arm) -> (f64, f64) {
 
 #[test]
 fn limited_acceleration_keeps_line_limits_and_joins_in_motion() {
-    let seat = seat();
+    let seat = common::seat();
     let job = Job {
         profile: Profile::Acceleration,
         ik_samples: 10,

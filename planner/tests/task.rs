@@ -1,27 +1,14 @@
 //! Plans through given poses: `planner task`.
 
+mod common;
+
 use std::path::Path;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use nullsweep_collision::Options;
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::task::{self, TaskConfig, TaskOutcome, Tolerance};
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
-
-/// Poses on a dome before the PR2: z into it, x upwards.
-fn dome() -> Vec<Isometry3<f64>> {
-    let mut poses = Vec::new();
-    for i in -2..=2 {
-        for k in -2..=2 {
-            let (yaw, pitch) = (0.15 * f64::from(i), 0.15 * f64::from(k));
-            let outward = UnitQuaternion::from_euler_angles(0.0, pitch, yaw) * -Vector3::x();
-            let at = Vector3::new(0.95, -0.3, 0.85) + outward * 0.3;
-            let frame = UnitQuaternion::face_towards(&-outward, &Vector3::y());
-            poses.push(Isometry3::from_parts(Translation3::from(at), frame));
-        }
-    }
-    poses
-}
 
 fn config(tolerance: Tolerance) -> TaskConfig {
     TaskConfig {

@@ -380,7 +380,7 @@ mod tests {
     #[test]
     fn another_users_robot_is_told_whatever_iceoryx2_calls_it() {
         let foreign = || {
-            let file = PathBuf::from("/tmp/there/nodes");
+            let file = PathBuf::from("elsewhere/nodes");
             Some(Foreign { file, owner: User { uid: 4_000_001 }, own: User { uid: 4_000_002 } })
         };
         for cause in [
@@ -391,7 +391,7 @@ mod tests {
             Cause::from(Ps::PublishSubscribeOpenError(PsOpen::InternalFailure)),
         ] {
             let text = format!("{}", cause.error("state", None, 1, foreign()));
-            let told = "state: another user's robot or folder: /tmp/there/nodes belongs to uid \
+            let told = "state: another user's robot or folder: elsewhere/nodes belongs to uid \
                         4000001, and this process runs as uid 4000002 (";
             assert!(text.starts_with(told), "{text}");
             assert!(text.contains("or give this system a root path of its own"), "{text}");

@@ -12,6 +12,7 @@ mod json;
 mod picture;
 mod plan;
 mod publish;
+mod refusal;
 mod replan;
 mod robot;
 mod scene;

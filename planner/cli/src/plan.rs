@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
@@ -19,10 +19,11 @@ use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg};
-use crate::exit::{OK, VIOLATIONS};
+use crate::exit::OK;
 use crate::json::write_json;
 use crate::picture::picture;
-use crate::robot::RobotArgs;
+use crate::refusal::write_unless_broken;
+use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, Numbers, SceneArgs, scene};
 
 #[derive(Debug, Args)]
@@ -200,21 +201,14 @@ fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
         println!("{}", table(figures));
     }
     let violations = &figures.verification.violations;
-    if violations.is_empty() {
-        outcome.plan.write(&args.out)?;
-        if !to_stdout {
-            println!("plan: {}", args.out.display());
-            if let Some(path) = &args.report {
-                println!("report: {}", path.display());
-            }
+    let code = write_unless_broken(&outcome.plan, violations, &args.out)?;
+    if code == OK && !to_stdout {
+        println!("plan: {}", args.out.display());
+        if let Some(path) = &args.report {
+            println!("report: {}", path.display());
         }
-        return Ok(OK);
     }
-    for v in violations.iter().take(10) {
-        eprintln!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail);
-    }
-    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
-    Ok(VIOLATIONS)
+    Ok(code)
 }
 
 /// The figures as name and value, for people.
@@ -266,14 +260,7 @@ fn figures_table(figures: &Figures) -> report::Table {
 }
 
 fn job(args: &PlanArgs, robot: &Robot, after: Option<After>) -> anyhow::Result<Job> {
-    let tool = match &args.tool {
-        None => Tool::default(),
-        Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("cannot read {}", path.display()))?;
-            toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))?
-        }
-    };
+    let tool = args.tool.as_deref().map_or(Ok(Tool::default()), tool_file)?;
     let stance = match (&after, args.base) {
         (Some(after), _) => StanceChoice::Given(Stance {
             base: after.plan.base,

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use anyhow::Context;
 use clap::Args;
 use nullsweep_collision::{MeshPaths, Options};
-use nullsweep_robot::{ArmSpec, Robot, Side};
+use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
 
 #[derive(Debug, Args)]
 pub(super) struct RobotArgs {
@@ -89,4 +89,11 @@ impl RobotArgs {
             ..Options::default()
         }
     }
+}
+
+/// Reads a tool's file.
+pub(super) fn tool_file(path: &Path) -> anyhow::Result<Tool> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))
 }

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
@@ -10,9 +9,10 @@ use nullsweep_planner::progress::Progress;
 use nullsweep_planner::task::{self, TaskConfig, TaskFigures, Tolerance};
 
 use crate::bars::Bars;
-use crate::exit::{OK, VIOLATIONS};
+use crate::exit::OK;
 use crate::json::write_json;
-use crate::robot::RobotArgs;
+use crate::refusal::write_unless_broken;
+use crate::robot::{RobotArgs, tool_file};
 
 #[derive(Debug, Args)]
 pub(super) struct TaskArgs {
@@ -51,14 +51,7 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
     let robot = args.robot.robot()?;
     let poses = task::read(&args.poses)?;
-    let tool = match &args.tool {
-        None => task::tip_tool(),
-        Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("cannot read {}", path.display()))?;
-            toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))?
-        }
-    };
+    let tool = args.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
     let config = TaskConfig {
         arm: args.robot.spec()?,
         tool,
@@ -85,19 +78,11 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
     if !to_stdout {
         println!("{}", table(figures));
     }
-    let violations = &outcome.verification.violations;
-    if violations.is_empty() {
-        outcome.plan.write(&args.out)?;
-        if !to_stdout {
-            println!("plan: {}", args.out.display());
-        }
-        return Ok(OK);
+    let code = write_unless_broken(&outcome.plan, &outcome.verification.violations, &args.out)?;
+    if code == OK && !to_stdout {
+        println!("plan: {}", args.out.display());
     }
-    for v in violations.iter().take(10) {
-        eprintln!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail);
-    }
-    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
-    Ok(VIOLATIONS)
+    Ok(code)
 }
 
 fn table(f: &TaskFigures) -> Table {

@@ -20,6 +20,7 @@ const TINY: f64 = 1e-200;
 pub(super) const LANES: usize = 8;
 
 /// Costs for the search over `m` clusters, one of which, the root, always stands at position 0.
+#[derive(Default)]
 pub(super) struct Table {
     pub(super) m: usize,
     pub(super) root: usize,
@@ -76,16 +77,11 @@ impl Table {
             transposed,
             data,
             lowest,
-            row_lowest: Vec::new(),
-            row_starts: Vec::new(),
-            near_out: Vec::new(),
-            near_in: Vec::new(),
-            near_cost: Vec::new(),
-            near_in_cost: Vec::new(),
-            near_start: Vec::new(),
             outer_root: root >= instance.clusters(),
             open: *instance.ends() != Ends::Closed,
             names: None,
+            // Filled in below.
+            ..Self::default()
         };
         table.find_row_lowest();
         table.find_candidates();
@@ -143,16 +139,11 @@ impl Table {
             transposed,
             data,
             lowest,
-            row_lowest: Vec::new(),
-            row_starts: Vec::new(),
-            near_out: Vec::new(),
-            near_in: Vec::new(),
-            near_cost: Vec::new(),
-            near_in_cost: Vec::new(),
-            near_start: Vec::new(),
             outer_root: self.outer_root,
             open: self.open,
             names: Some(nodes.to_vec()),
+            // Filled in below.
+            ..Self::default()
         };
         table.find_row_lowest();
         table.find_candidates();

@@ -4,7 +4,7 @@ use nullsweep_robot::JointVector;
 use nullsweep_surface::Patch;
 
 use super::attempt::{Planning, Sequence, Visit};
-use crate::plan::{FORMAT, Held, Plan, PlanKnot, Profile, SurfaceSample};
+use crate::plan::{Plan, PlanKnot, SurfaceSample};
 use crate::timing;
 
 impl Planning<'_> {
@@ -35,23 +35,12 @@ impl Planning<'_> {
             }
             same
         });
-        let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
-        for (knot, time) in knots.iter_mut().zip(timing::bang_bang(&joints, &self.velocity)) {
-            knot.time_ns = time;
-        }
+        timing::set_times(&mut knots, &self.velocity);
         Plan {
-            format: FORMAT,
-            robot: robot.name().into(),
-            fingerprint: arm.fingerprint(),
-            joints: arm.joint_names().to_vec(),
-            held: Held::all_of(arm),
-            tool: job.tool.clone(),
             base: stance.base,
             method: job.method,
             cost: job.cost,
-            profile: Profile::Velocity,
             seed: job.seed,
-            knots,
             patches: patches.iter().map(|p| p.centre.into()).collect(),
             surface: (0..scan.points.len())
                 .map(|i| SurfaceSample {
@@ -66,6 +55,7 @@ impl Planning<'_> {
                 .as_ref()
                 .filter(|a| !a.again)
                 .map_or_else(Vec::new, |a| a.plan.followed(a.knot)),
+            ..Plan::of(robot, arm, &job.tool, knots)
         }
     }
 }

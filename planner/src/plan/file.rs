@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use nullsweep_robot::{Arm, Tool};
+use nullsweep_robot::{Arm, Robot, Tool};
 use serde::{Deserialize, Serialize};
 
 use super::curve::Curve;
@@ -117,6 +117,30 @@ pub struct Continues {
 }
 
 impl Plan {
+    /// A bang-bang plan through these knots, base and root frame in one place, of no patch and no
+    /// scan: what else it is made for is filled in by who makes it.
+    #[must_use]
+    pub fn of(robot: &Robot, arm: &Arm, tool: &Tool, knots: Vec<PlanKnot>) -> Self {
+        Self {
+            format: FORMAT,
+            robot: robot.name().into(),
+            fingerprint: arm.fingerprint(),
+            joints: arm.joint_names().to_vec(),
+            held: Held::all_of(arm),
+            tool: tool.clone(),
+            base: [0.0; 3],
+            method: Method::Tsp,
+            cost: CostKind::Effort,
+            profile: Profile::Velocity,
+            seed: 0,
+            knots,
+            patches: Vec::new(),
+            surface: Vec::new(),
+            continues: None,
+            past: Vec::new(),
+        }
+    }
+
     /// Reads a plan file.
     ///
     /// # Errors

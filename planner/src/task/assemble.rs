@@ -5,7 +5,7 @@ use nullsweep_robot::{Arm, JointVector, Robot};
 
 use super::config::TaskConfig;
 use super::route::Route;
-use crate::plan::{CostKind, FORMAT, Held, Method, Plan, PlanKnot, Profile, SurfaceSample};
+use crate::plan::{Plan, PlanKnot, SurfaceSample};
 use crate::{cost, timing};
 
 /// The route as a plan.
@@ -29,28 +29,12 @@ pub(super) fn assemble(
         let line = Some([at.x, at.y, at.z]);
         knots.push(knot(point.q, line, Some(pose as u32)));
     }
-    let velocity = cost::velocities(arm, config.v_max);
-    let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
-    for (knot, time) in knots.iter_mut().zip(timing::bang_bang(&joints, &velocity)) {
-        knot.time_ns = time;
-    }
+    timing::set_times(&mut knots, &cost::velocities(arm, config.v_max));
     Plan {
-        format: FORMAT,
-        robot: robot.name().into(),
-        fingerprint: arm.fingerprint(),
-        joints: arm.joint_names().to_vec(),
-        held: Held::all_of(arm),
-        tool: config.tool.clone(),
-        base: [0.0; 3],
-        method: Method::Tsp,
-        cost: CostKind::Effort,
-        profile: Profile::Velocity,
         seed: config.seed,
-        knots,
         patches: poses.iter().map(|p| p.translation.vector.into()).collect(),
         surface: poses.iter().map(place).collect(),
-        continues: None,
-        past: Vec::new(),
+        ..Plan::of(robot, arm, &config.tool, knots)
     }
 }
 

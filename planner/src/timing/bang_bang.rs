@@ -2,6 +2,8 @@
 
 use nullsweep_robot::{JointVector, MAX_DOF};
 
+use crate::plan::PlanKnot;
+
 /// The time that each knot is reached, from 0, when every straight segment runs as fast as its
 /// slowest joint allows and all joints arrive together (Eq. 2): the joint path stays the chord
 /// that was checked. Rounded up to whole nanoseconds a segment, at least 1 ns, so that times rise
@@ -19,6 +21,14 @@ pub fn bang_bang(path: &[JointVector], velocity: &JointVector) -> Vec<u64> {
         times.push(now);
     }
     times
+}
+
+/// Sets the times of knots as [`bang_bang`] has them.
+pub fn set_times(knots: &mut [PlanKnot], velocity: &JointVector) {
+    let joints: Vec<JointVector> = knots.iter().map(|k| k.q).collect();
+    for (knot, time) in knots.iter_mut().zip(bang_bang(&joints, velocity)) {
+        knot.time_ns = time;
+    }
 }
 
 /// The least time from `a` to `b`. \[ns\]

@@ -8,7 +8,7 @@ mod smooth;
 mod smooth_path;
 
 pub use accelerate::{Rest, accelerate};
-pub use bang_bang::{bang_bang, segment_ns};
+pub use bang_bang::{bang_bang, segment_ns, set_times};
 pub use sampled::{Timed, timed};
 pub use smooth::smooth;
 pub use smooth_path::{Piece, SmoothPath};

@@ -2,6 +2,8 @@
 
 mod case;
 mod collisions;
+#[path = "../common/mod.rs"]
+mod common;
 mod pad;
 mod stage;
 

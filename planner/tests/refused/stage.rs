@@ -32,10 +32,7 @@ pub(crate) struct Stage {
 pub(crate) fn stage() -> &'static Stage {
     static STAGE: OnceLock<Stage> = OnceLock::new();
     STAGE.get_or_init(|| {
-        let view = simulate::chair(1);
-        let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
-        let seat = clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default()).unwrap();
-        let scene = Scene::from(seat);
+        let scene = crate::common::seat();
         let held = vec![("torso_lift_joint".to_owned(), 0.1)];
         let stance = Stance { base: [-0.04, 0.574, 5.607], held };
         let to_root = stance.pose().inverse();

@@ -1,0 +1,28 @@
+//! A plan that breaks a rule is told and not written.
+
+use std::path::Path;
+
+use nullsweep_planner::plan::Plan;
+use nullsweep_planner::verify::Violation;
+
+use crate::exit::{OK, VIOLATIONS};
+
+/// Most violations that are told one by one.
+const TOLD: usize = 10;
+
+/// Writes the plan, or tells what it breaks; the exit code.
+pub(super) fn write_unless_broken(
+    plan: &Plan,
+    violations: &[Violation],
+    out: &Path,
+) -> anyhow::Result<u8> {
+    if violations.is_empty() {
+        plan.write(out)?;
+        return Ok(OK);
+    }
+    for v in violations.iter().take(TOLD) {
+        eprintln!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail);
+    }
+    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
+    Ok(VIOLATIONS)
+}

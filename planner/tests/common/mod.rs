@@ -1,0 +1,30 @@
+//! What several tests plan for. Each of them uses a part.
+#![allow(dead_code, reason = "each test compiles this by itself")]
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nullsweep_planner::workcell::Scene;
+use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
+
+/// The seat of the simulated chair, the rest of it in the way.
+pub(crate) fn seat() -> Scene {
+    let view = simulate::chair(1);
+    let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
+    clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default())
+        .expect("the seat is there")
+        .into()
+}
+
+/// Poses on a dome before the PR2: z into it, x upwards.
+pub(crate) fn dome() -> Vec<Isometry3<f64>> {
+    let mut poses = Vec::new();
+    for i in -2..=2 {
+        for k in -2..=2 {
+            let (yaw, pitch) = (0.15 * f64::from(i), 0.15 * f64::from(k));
+            let outward = UnitQuaternion::from_euler_angles(0.0, pitch, yaw) * -Vector3::x();
+            let at = Vector3::new(0.95, -0.3, 0.85) + outward * 0.3;
+            let frame = UnitQuaternion::face_towards(&-outward, &Vector3::y());
+            poses.push(Isometry3::from_parts(Translation3::from(at), frame));
+        }
+    }
+    poses
+}
