@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 use nullsweep_collision::Options;
 use nullsweep_planner::pipeline::{Job, Outcome, StanceChoice, run};
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_robot::{ArmSpec, Robot, Tool};
-use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
 
 /// An arm in the manner of industrial ones: shoulder and elbow parallel, a spherical wrist, the
 /// flange's x axis ahead.

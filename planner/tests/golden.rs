@@ -7,7 +7,6 @@ mod common;
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use nullsweep_collision::Options;
 use nullsweep_planner::pipeline::{Job, StanceChoice, run};
 use nullsweep_planner::plan::{CostKind, Method, Profile};

@@ -27,12 +27,12 @@ fn config(tolerance: Tolerance) -> TaskConfig {
 }
 
 fn plan(tolerance: Tolerance) -> TaskOutcome {
-    task::run(&Robot::pr2(), &dome(), &config(tolerance), &Silent).unwrap()
+    task::run(&Robot::pr2(), &common::dome(), &config(tolerance), &Silent).unwrap()
 }
 
 #[test]
 fn every_pose_is_met_and_tolerance_saves_movement() {
-    let poses = dome();
+    let poses = common::dome();
     let exact = plan(Tolerance::AXIS);
     let loose = plan(Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]));
     let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).unwrap();
@@ -61,7 +61,7 @@ fn a_seed_gives_the_same_plan() {
     let (one, two) = (plan(Tolerance::AXIS), plan(Tolerance::AXIS));
     assert_eq!(one.plan, two.plan);
     let other = TaskConfig { seed: 2, ..config(Tolerance::AXIS) };
-    let other = task::run(&Robot::pr2(), &dome(), &other, &Silent).unwrap();
+    let other = task::run(&Robot::pr2(), &common::dome(), &other, &Silent).unwrap();
     assert_ne!(one.plan.knots, other.plan.knots);
 }
 

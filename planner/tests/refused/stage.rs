@@ -12,7 +12,6 @@ use nullsweep_planner::timing::{Limits, accelerate, bang_bang};
 use nullsweep_planner::verify::{Given, Verification, verify};
 use nullsweep_planner::workcell::{Scene, Stance, Workcell};
 use nullsweep_robot::{Arm, ArmSpec, Geometry, JointVector, Robot, Side, Tool};
-use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
 
 /// A real plan for the chair's seat and all that it was made for.
 pub(crate) struct Stage {
