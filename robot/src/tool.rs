@@ -30,12 +30,20 @@ pub struct Tool {
     pub across: [f64; 3],
     /// Distance kept between pad centre and surface, along the normal. \[m\]
     pub stand_off: f64,
+    /// How far the pad's soft body may be pressed in, along its axis, anywhere in its rectangle. \[m\]
+    #[serde(default = "default_press_max")]
+    pub press_max: f64,
     /// Whether a heading and its opposite are the same contact.
     pub symmetric: bool,
     /// A point is swept within this distance of the pad's plane. \[m\]
     pub reach_normal: f64,
     /// A point is swept if its normal is within this angle of the pad's. \[rad\]
     pub reach_angle: f64,
+}
+
+/// Of a tool file that does not say it: a third of the default sponge. \[m\]
+fn default_press_max() -> f64 {
+    0.010
 }
 
 impl Default for Tool {
@@ -51,6 +59,7 @@ impl Default for Tool {
             approach: [1.0, 0.0, 0.0],
             across: [0.0, 1.0, 0.0],
             stand_off: 0.0,
+            press_max: default_press_max(),
             symmetric: true,
             reach_normal: 0.010,
             reach_angle: 30f64.to_radians(),

@@ -7,7 +7,7 @@ use parry3d_f64::shape::SharedShape;
 use crate::bodies::MAX_BODIES;
 use crate::frame::Frame;
 use crate::motion::Slack;
-use crate::moving::Moving;
+use crate::moving::{Moving, Pad, Touch};
 use crate::rules::{Hit, TOLERANCE, ToolContact};
 use crate::solid::{Solid, gjk_distance};
 use crate::spheres::Sphere;
@@ -80,18 +80,8 @@ impl World {
             ToolContact::Forbidden => None,
         };
         let margin = match touch {
-            // The pad is clear if no point is where its keep-out boxes are.
-            Some(touch) if touch.depth == f64::INFINITY => {
-                let far =
-                    |s: &Sphere| self.field.is_farther(&pose.apply(&s.centre), s.radius + slack);
-                let holds =
-                    |p: &Vector3<f64>| self.point_value(shape, pose, contact, p, slack) >= slack;
-                return touch.tree.all(far, |_| false)
-                    || touch.guards.iter().all(|(place, solid)| {
-                        self.field.all_near(solid, &pose.then(place), slack, holds)
-                    });
-            }
-            Some(touch) => touch.margin,
+            Some(Touch::Pad(pad)) => return self.is_pad_clear(shape, pad, pose, slack),
+            Some(Touch::Rigid(margin)) => *margin,
             None => self.margins.environment,
         };
         let need = margin + slack;
@@ -102,8 +92,21 @@ impl World {
             return true;
         }
         self.field.all_near(&shape.solid, &pose.then(&shape.place), need, |p| {
-            self.point_value(shape, pose, contact, p, slack) >= slack
+            let local = shape.place.apply_inverse(&pose.apply_inverse(p));
+            distance_for(&shape.solid, &local, need) >= need
         })
+    }
+
+    /// Whether the pad in contact is clear of the points that press on it: none is where its
+    /// keep-out boxes are.
+    fn is_pad_clear(&self, shape: &Moving, pad: &Pad, pose: &Frame, slack: f64) -> bool {
+        let far = |s: &Sphere| self.firm.is_farther(&pose.apply(&s.centre), s.radius + slack);
+        let holds = |p: &Vector3<f64>| self.pad_value(shape, pad, pose, p, slack) >= slack;
+        pad.tree.all(far, |_| false)
+            || pad
+                .guards
+                .iter()
+                .all(|(place, solid)| self.firm.all_near(solid, &pose.then(place), slack, holds))
     }
 
     /// Whether one check holds with the slack added, the bodies standing at `poses`.
@@ -143,25 +146,20 @@ impl World {
         })
     }
 
-    /// A lower bound of how far the shape can move, relative to the scan point `p` (root frame),
+    /// A lower bound of how far the pad in contact can move, relative to the point `p` (root frame),
     /// before the point breaks the rules; negative if it does now. Not looked at more closely than
     /// to tell whether it is at least `enough`. \[m\]
-    pub(crate) fn point_value(
+    fn pad_value(
         &self,
         shape: &Moving,
+        pad: &Pad,
         pose: &Frame,
-        contact: ToolContact,
         p: &Vector3<f64>,
         enough: f64,
     ) -> f64 {
         let in_body = pose.apply_inverse(p);
         let local = shape.place.apply_inverse(&in_body);
-        let (Some(touch), ToolContact::Allowed) = (&shape.touch, contact) else {
-            let margin = self.margins.environment;
-            return distance_for(&shape.solid, &local, margin + enough) - margin;
-        };
-        let distance = distance_for(&shape.solid, &local, touch.margin + enough);
-        let free = distance - touch.margin;
+        let free = distance_for(&shape.solid, &local, pad.margin + enough) - pad.margin;
         if free >= enough {
             return free;
         }
@@ -170,12 +168,11 @@ impl World {
         if !in_prism && free < 0.0 {
             return free;
         }
-        // What is left is to stay out of the keep-out boxes and not too deep in the shape.
-        touch
-            .keep_out
+        // What is left is to stay out of the keep-out boxes.
+        pad.keep_out
             .iter()
             .map(|(min, max)| box_distance(min, max, &at))
-            .fold(distance + touch.depth, f64::min)
+            .fold(f64::INFINITY, f64::min)
             .max(free)
     }
 

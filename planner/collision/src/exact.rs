@@ -1,4 +1,4 @@
-//! The slow check: parry's shapes, every pair and every raw point, poses from the robot crate.
+//! The slow check: parry's shapes, every pair and every point, poses from the robot crate.
 
 use nalgebra::Point3;
 use nullsweep_robot::{Arm, JointVector, Robot, Tool};
@@ -9,45 +9,49 @@ use parry3d_f64::shape::Shape;
 use crate::error::CollisionError;
 use crate::obstacle::Obstacle;
 use crate::options::Options;
+use crate::points::Points;
 use crate::rules::{Hit, ToolContact, With};
 use crate::scene::Scene;
 use crate::shapes::{distance, pose, poses};
+use crate::tree::Tree;
 
-/// The exact check: every pair and every raw point by parry's queries, at poses from the robot
+/// The exact check: every pair and every point by parry's queries, at poses from the robot
 /// crate's kinematics. Slow: for the verification.
 ///
 /// It stands alone, so that it and the fast check ([`World`](crate::World)) can be tested against
 /// each other. What they share is made before either: the prepared shapes, which of them move and
 /// which are rigid to each other, the list of pairs to check, the margins and the contact rule. Bounds,
-/// sphere trees, the distance grid and the poses by which the fast check goes have no part in it, and
-/// it leaves no pair out because of a proof.
+/// sphere trees, the distance grid and the poses by which the fast check goes have no part in it (it
+/// finds points by a tree of its own), and it leaves no pair out because of a proof.
 pub struct Exact {
     arm: Arm,
     scene: Scene,
+    tree: Tree,
 }
 
 impl Exact {
-    /// Prepares the check of an arm with a tool among scan points \[m\] and obstacles, both in the
-    /// robot's root frame.
+    /// Prepares the check of an arm with a tool among points and obstacles, both in the robot's root
+    /// frame.
     ///
     /// # Errors
     /// When a mesh or the SRDF cannot be used, a link is unknown, a margin or a scan point is not a
     /// proper number, or the arm drives too many joints; see [`CollisionError`].
-    pub fn new(
+    pub fn new<'a>(
         robot: &Robot,
         arm: &Arm,
         tool: &Tool,
-        points: &[Point3<f64>],
+        points: impl Into<Points<'a>>,
         obstacles: &[Obstacle],
         options: &Options,
     ) -> Result<Self, CollisionError> {
-        let (scene, _) = Scene::prepare(robot, arm, tool, points, obstacles, options)?;
+        let (scene, _) = Scene::prepare(robot, arm, tool, &points.into(), obstacles, options)?;
         Ok(Self::over(arm.clone(), scene))
     }
 
     /// The check in a scene that is prepared.
     pub(crate) fn over(arm: Arm, scene: Scene) -> Self {
-        Self { arm, scene }
+        let tree = Tree::new(&scene.points.points);
+        Self { arm, scene, tree }
     }
 
     pub(crate) fn scene(&self) -> &Scene {
@@ -81,7 +85,7 @@ impl Exact {
     }
 
     /// The first part that does not move with the arm (base, torso, other arm) and is too near to
-    /// the scan or to an obstacle that does not carry the robot.
+    /// a point or to an obstacle that does not carry the robot.
     #[must_use]
     pub fn stance_hit(&self) -> Option<Hit> {
         let scene = &self.scene;
@@ -124,33 +128,29 @@ impl Exact {
             let p = to_contact * p;
             p.x.abs() <= 0.5 * tool.width + margins.contact_growth
                 && p.y.abs() <= 0.5 * tool.length + margins.contact_growth
-                && (-tool.thickness..=margins.contact_front).contains(&p.z)
+                && (-tool.press_max..=margins.contact_front).contains(&p.z)
         };
         for &i in parts {
             let may_touch = contact == ToolContact::Allowed && scene.at_tip[i];
-            let is_pad = scene.parts[i].is_pad;
-            let outside = match (may_touch, is_pad) {
+            let is_pressed = may_touch && scene.parts[i].is_pad;
+            let margin = match (may_touch, is_pressed) {
                 (true, true) => margins.environment.min(margins.contact_growth),
                 (true, false) => margins.environment.min(margins.contact_clearance),
                 (false, _) => margins.environment,
             };
             let shape = &*scene.parts[i].shape;
             // Points outside the shape's bounds, grown by the margin, are farther than it.
-            let bounds = shape.compute_aabb(&poses[i]).loosened(outside);
-            for p in &scene.points {
-                if !bounds.contains_local_point(Vec3::new(p.x, p.y, p.z)) {
-                    continue;
-                }
+            let bounds = shape.compute_aabb(&poses[i]).loosened(margin);
+            let corner = |v: Vec3| Point3::new(v.x, v.y, v.z);
+            let hit = self.tree.find(&corner(bounds.mins), &corner(bounds.maxs), |index| {
+                let p = &scene.points.points[index];
                 let distance = signed_distance(shape, &poses[i], p);
-                let margin = match may_touch && distance < outside && in_prism(p) {
-                    true if is_pad => continue,
-                    true => -margins.contact_depth,
-                    false => outside,
-                };
-                if breaks(distance, margin) {
-                    let link = scene.parts[i].name.clone();
-                    return Some(Hit { link, with: With::ScanPoint(*p), distance, margin });
-                }
+                let gives_way = is_pressed && (!scene.points.is_firm(index) || in_prism(p));
+                (breaks(distance, margin) && !gives_way).then_some((index, distance))
+            });
+            if let Some((index, distance)) = hit {
+                let link = scene.parts[i].name.clone();
+                return Some(Hit { link, with: scene.points.name(index), distance, margin });
             }
         }
         None
@@ -163,7 +163,7 @@ impl std::fmt::Debug for Exact {
             .field("parts", &self.scene.parts.len())
             .field("pairs", &self.scene.pairs.checked.len())
             .field("obstacles", &self.scene.obstacles.len())
-            .field("points", &self.scene.points.len())
+            .field("points", &self.scene.points.points.len())
             .finish_non_exhaustive()
     }
 }

@@ -13,25 +13,26 @@
 //!   SRDF disables: [`World::excluded`] lists them with the [`Reason`]. The fast check also leaves
 //!   out pairs that are proven never to come near each other; a joint more than 0.35 rad beyond its
 //!   limits, where no proof was made, counts as a collision there.
-//! - Each of them against the scan's points and the obstacles, with [`Margins::environment`].
+//! - Each of them against the points around it and the obstacles, with [`Margins::environment`].
 //! - What does not move with the arm against the environment, once: [`World::stance_hit`].
 //!
-//! # The contact rule
-//! With [`ToolContact::Allowed`] the pad may touch the scan. Its *prism* is the pad's rectangle
-//! grown by [`Margins::contact_growth`] on all four sides, from [`Margins::contact_front`] before
-//! the pad's plane back to the pad's back (its thickness). Scan points in the prism are contact:
-//! the sponge is compressed there. So, for a scan point in the prism,
-//! - the pad is never in collision with it;
-//! - a shape that is rigid to the tip (palm, fingers, fingertips: they hold the sponge and end only
-//!   11 mm behind its plane on the PR2, while a depth camera's noise is ±5 mm) is in collision only
-//!   if the point lies deeper than [`Margins::contact_depth`] inside of it;
-//! - every other shape keeps its full margin.
+//! # What is around the robot
+//! [`Points`] are of three kinds: of the surface, raw measurements, and the border of what no view
+//! has seen. The rules below say where they differ.
 //!
-//! Scan points outside the prism keep the full margin from every shape that is not rigid to the
-//! tip. The pad keeps the smaller of it and `contact_growth`, the other shapes that are rigid to
-//! the tip the smaller of it and [`Margins::contact_clearance`]: a flat surface beside the pad,
-//! 11 mm before the fingertips, is then no collision, while anything behind the pad's back still
-//! is. Obstacles are never contact.
+//! # The contact rule
+//! With [`ToolContact::Allowed`] the pad may touch. Its *prism* is the pad's rectangle grown by
+//! [`Margins::contact_growth`] on all four sides, from [`Margins::contact_front`] before the pad's
+//! plane to the tool's `press_max` behind it: so far the pad's soft body gives way.
+//! - The pad is never in collision with a point in the prism. From those outside it keeps the
+//!   smaller of [`Margins::environment`] and `contact_growth`. Raw measurements do not count: their
+//!   noise is not the shape that presses, and what it hides is the surface's.
+//! - A rigid shape that does not move against the tip (palm, fingers: they hold the sponge and end
+//!   only 11 mm behind its plane on the PR2) keeps the smaller of [`Margins::environment`] and
+//!   [`Margins::contact_clearance`] from every point.
+//! - Every other shape keeps its full margin.
+//!
+//! Obstacles are never contact.
 
 mod bodies;
 mod check;
@@ -48,6 +49,7 @@ mod obstacle;
 mod options;
 mod pairs;
 mod parts;
+mod points;
 mod proof;
 mod rules;
 mod scene;
@@ -58,6 +60,7 @@ mod spheres;
 mod srdf;
 #[cfg(test)]
 mod tests;
+mod tree;
 mod world;
 
 pub use error::CollisionError;
@@ -66,6 +69,7 @@ pub use mesh::{MeshError, MeshPaths};
 pub use obstacle::{Obstacle, ObstacleShape};
 pub use options::{Attached, Options};
 pub use pairs::{Excluded, Reason};
+pub use points::Points;
 pub use rules::{Hit, Margins, ToolContact, With};
 pub use srdf::{GroupState, SrdfError, group_states};
 pub use world::World;

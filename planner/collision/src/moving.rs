@@ -1,4 +1,4 @@
-//! The shapes that move with the arm, prepared for the fast check, and how the scan may touch them.
+//! The shapes that move with the arm, prepared for the fast check, and how points may touch them.
 
 use nalgebra::Vector3;
 use nullsweep_robot::Tool;
@@ -22,21 +22,27 @@ pub(crate) struct Moving {
     pub(crate) tree: SphereTree,
     /// Indices of the fixed shapes to check against.
     pub(crate) against: Vec<usize>,
-    /// How scan points may touch it, if they may.
+    /// How points may touch it, if they may.
     pub(crate) touch: Option<Touch>,
 }
 
-/// How a shape that is rigid to the tip may touch the scan.
-pub(crate) struct Touch {
-    /// Margin to scan points outside the prism. \[m\]
+/// How a shape that does not move against the tip may touch points.
+pub(crate) enum Touch {
+    /// Rigid: by this margin. \[m\]
+    Rigid(f64),
+    /// The pad: anything in its prism.
+    Pad(Pad),
+}
+
+/// Where the pad keeps its margin while it may touch.
+pub(crate) struct Pad {
+    /// Margin to points outside the prism. \[m\]
     pub(crate) margin: f64,
-    /// How deep a scan point of the prism may lie inside; infinite for the pad. \[m\]
-    pub(crate) depth: f64,
     /// Boxes (contact frame) that hold all places outside the prism within the margin. \[m\]
     pub(crate) keep_out: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// Their corners, in the body frame. \[m\]
     corners: Vec<Vector3<f64>>,
-    /// The boxes as solids, and spheres that cover them, in the body frame; only for the pad.
+    /// The boxes as solids, and spheres that cover them, in the body frame.
     pub(crate) guards: Vec<(Frame, Solid)>,
     pub(crate) tree: SphereTree,
 }
@@ -78,7 +84,11 @@ impl Moving {
     }
 
     fn corners(&self) -> impl Iterator<Item = &Vector3<f64>> {
-        self.touch.iter().flat_map(|touch| &touch.corners)
+        let pad = match &self.touch {
+            Some(Touch::Pad(pad)) => Some(pad),
+            _ => None,
+        };
+        pad.into_iter().flat_map(|pad| &pad.corners)
     }
 }
 
@@ -89,7 +99,7 @@ impl Contact {
         let growth = Vector3::new(margins.contact_growth, margins.contact_growth, 0.0);
         Self {
             frame: bodies.tip.then(&contact_in_tip),
-            min: -half - growth - Vector3::new(0.0, 0.0, tool.thickness),
+            min: -half - growth - Vector3::new(0.0, 0.0, tool.press_max),
             max: half + growth + Vector3::new(0.0, 0.0, margins.contact_front),
         }
     }
@@ -97,11 +107,17 @@ impl Contact {
 
 impl Touch {
     pub(crate) fn new(part: &Part, place: &Frame, contact: &Contact, margins: &Margins) -> Self {
-        let (margin, depth) = if part.is_pad {
-            (margins.environment.min(margins.contact_growth), f64::INFINITY)
+        if part.is_pad {
+            Self::Pad(Pad::new(part, place, contact, margins))
         } else {
-            (margins.environment.min(margins.contact_clearance), margins.contact_depth)
-        };
+            Self::Rigid(margins.environment.min(margins.contact_clearance))
+        }
+    }
+}
+
+impl Pad {
+    fn new(part: &Part, place: &Frame, contact: &Contact, margins: &Margins) -> Self {
+        let margin = margins.environment.min(margins.contact_growth);
         // Bounds of the shape grown by its margin, in the contact frame.
         let local = contact.frame.inverse_then(place);
         let (low, high) = part.solid.bounds();
@@ -122,14 +138,12 @@ impl Touch {
             }
         }
         let (mut guards, mut tree) = (Vec::new(), SphereTree::default());
-        if part.is_pad {
-            for (low, high) in &keep_out {
-                let cover = Solid::Box { half: 0.5 * (high - low) };
-                let at = Frame { translation: 0.5 * (low + high), ..Frame::IDENTITY };
-                let at = contact.frame.then(&at);
-                tree.append(&SphereTree::new(&cover, &at));
-                guards.push((at, cover));
-            }
+        for (low, high) in &keep_out {
+            let cover = Solid::Box { half: 0.5 * (high - low) };
+            let at = Frame { translation: 0.5 * (low + high), ..Frame::IDENTITY };
+            let at = contact.frame.then(&at);
+            tree.append(&SphereTree::new(&cover, &at));
+            guards.push((at, cover));
         }
         let corners = keep_out
             .iter()
@@ -141,6 +155,6 @@ impl Touch {
             })
             .map(|corner| contact.frame.apply(&corner))
             .collect();
-        Self { margin, depth, keep_out, corners, guards, tree }
+        Self { margin, keep_out, corners, guards, tree }
     }
 }

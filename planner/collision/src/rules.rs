@@ -11,18 +11,15 @@ pub(crate) const TOLERANCE: f64 = 1e-8;
 pub struct Margins {
     /// Between shapes of the robot.
     pub self_clearance: f64,
-    /// Between the robot and the environment (scan points and obstacles).
+    /// Between the robot and the environment (measured points, unseen space, obstacles).
     pub environment: f64,
-    /// How far the contact prism reaches beyond the pad's sides; also the pad's own margin to scan
-    /// points outside the prism while contact is allowed.
+    /// How far the contact prism reaches beyond the pad's sides; also the pad's own margin to points
+    /// outside the prism while contact is allowed.
     pub contact_growth: f64,
     /// How far the contact prism reaches before the pad's plane.
     pub contact_front: f64,
-    /// What shapes that are rigid to the tip keep from scan points outside the prism while contact
-    /// is allowed.
+    /// What rigid shapes that do not move against the tip keep from points while contact is allowed.
     pub contact_clearance: f64,
-    /// How deep a point of the contact prism may lie inside a shape that is rigid to the tip.
-    pub contact_depth: f64,
 }
 
 impl Default for Margins {
@@ -33,7 +30,6 @@ impl Default for Margins {
             contact_growth: 0.005,
             contact_front: 0.015,
             contact_clearance: 0.001,
-            contact_depth: 0.005,
         }
     }
 }
@@ -65,8 +61,10 @@ pub struct Hit {
 pub enum With {
     /// Another link (or the tool, or an attached object).
     Link(String),
-    /// A scan point, in the root frame. \[m\]
+    /// A measured point, in the root frame. \[m\]
     ScanPoint(Point3<f64>),
+    /// Space that no view has seen, at this place in the root frame. \[m\]
+    Unseen(Point3<f64>),
     /// An obstacle.
     Obstacle(String),
 }
@@ -79,6 +77,7 @@ impl std::fmt::Display for Hit {
             With::Link(name) => write!(f, "{name}")?,
             With::Obstacle(name) => write!(f, "obstacle {name}")?,
             With::ScanPoint(p) => write!(f, "scan point ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)?,
+            With::Unseen(p) => write!(f, "unseen space at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)?,
         }
         write!(f, ", must keep {margin:.1} mm")
     }

@@ -1,7 +1,7 @@
 //! What both checks are built from: the robot's parts, the pairs of them to check, the scan's points
 //! and the obstacles.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 use nullsweep_robot::{Arm, Robot, Tool};
 use parry3d_f64::shape::SharedShape;
 
@@ -12,6 +12,7 @@ use crate::obstacle::{Obstacle, ObstacleShape};
 use crate::options::Options;
 use crate::pairs::{self, Pairs};
 use crate::parts::{self, Part};
+use crate::points::{Points, Sorted};
 use crate::rules::Margins;
 use crate::solid::Solid;
 
@@ -25,7 +26,7 @@ pub(crate) struct Scene {
     /// For each part: is it rigid to the tip?
     pub(crate) at_tip: Vec<bool>,
     pub(crate) pairs: Pairs,
-    pub(crate) points: Vec<Point3<f64>>,
+    pub(crate) points: Sorted,
     pub(crate) obstacles: Vec<PreparedObstacle>,
     pub(crate) tool: Tool,
     pub(crate) margins: Margins,
@@ -49,7 +50,7 @@ impl Scene {
         robot: &Robot,
         arm: &Arm,
         tool: &Tool,
-        points: &[Point3<f64>],
+        points: &Points<'_>,
         obstacles: &[Obstacle],
         options: &Options,
     ) -> Result<(Self, Bodies), CollisionError> {
@@ -69,7 +70,7 @@ impl Scene {
             at_tip: parts.iter().map(|part| body_of(part) == Some(bodies.tip_body)).collect(),
             parts,
             pairs,
-            points: points.to_vec(),
+            points: points.sorted(),
             obstacles,
             tool: tool.clone(),
             margins: options.margins,
@@ -92,20 +93,19 @@ impl PreparedObstacle {
     }
 }
 
-fn check_input(points: &[Point3<f64>], margins: &Margins) -> Result<(), CollisionError> {
+fn check_input(points: &Points<'_>, margins: &Margins) -> Result<(), CollisionError> {
     for (name, value) in [
         ("self_clearance", margins.self_clearance),
         ("environment", margins.environment),
         ("contact_growth", margins.contact_growth),
         ("contact_front", margins.contact_front),
         ("contact_clearance", margins.contact_clearance),
-        ("contact_depth", margins.contact_depth),
     ] {
         if !(value >= 0.0 && value.is_finite()) {
             return Err(CollisionError::Margin { name, value });
         }
     }
-    match points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+    match points.all().position(|p| !p.iter().all(|x| x.is_finite())) {
         Some(index) => Err(CollisionError::NotFinite { index }),
         None => Ok(()),
     }

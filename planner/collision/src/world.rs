@@ -1,6 +1,5 @@
 //! A robot in its surroundings, prepared for fast collision checks.
 
-use nalgebra::Point3;
 use nullsweep_robot::{Arm, JointVector, Robot, Tool};
 
 use crate::bodies::Bodies;
@@ -15,6 +14,7 @@ use crate::never::{self, Placed, Ranges, never_near};
 use crate::obstacle::Obstacle;
 use crate::options::Options;
 use crate::pairs::Excluded;
+use crate::points::Points;
 use crate::rules::{Hit, Margins};
 use crate::scene::Scene;
 use crate::solid::Solid;
@@ -31,7 +31,10 @@ pub struct World {
     pub(crate) fixed: Vec<Fixed>,
     /// Pairs of moving shapes to check.
     pub(crate) pairs: Vec<(usize, usize)>,
+    /// All points.
     pub(crate) field: Field,
+    /// Those that press on the pad.
+    pub(crate) firm: Field,
     pub(crate) reach: Reach,
     pub(crate) margins: Margins,
     pub(crate) contact: Contact,
@@ -49,30 +52,44 @@ struct Sorted {
 }
 
 impl World {
-    /// Prepares the checks of an arm with a tool among scan points \[m\] and obstacles, both in the
-    /// robot's root frame.
+    /// Prepares the checks of an arm with a tool among points and obstacles, both in the robot's root
+    /// frame.
     ///
     /// # Errors
     /// When a mesh or the SRDF cannot be used, a link is unknown, a margin or a scan point is not a
     /// proper number, or the arm drives too many joints; see [`CollisionError`].
-    pub fn new(
+    pub fn new<'a>(
         robot: &Robot,
         arm: &Arm,
         tool: &Tool,
-        scan_points: &[Point3<f64>],
+        points: impl Into<Points<'a>>,
         obstacles: &[Obstacle],
         options: &Options,
     ) -> Result<Self, CollisionError> {
-        let (scene, bodies) = Scene::prepare(robot, arm, tool, scan_points, obstacles, options)?;
+        let (scene, bodies) = Scene::prepare(robot, arm, tool, &points.into(), obstacles, options)?;
         let margins = options.margins;
         let contact = Contact::new(&bodies, tool, &margins);
         let Sorted { mut moving, fixed, mut pairs } = sort(&scene, &bodies, &contact);
         let reach = Reach::new(&bodies, arm, &moving);
-        let field = Field::new(scan_points, &reach.centre, reach.radius + margins.environment);
+        let near =
+            |points: &[_]| Field::new(points, &reach.centre, reach.radius + margins.environment);
+        let (field, firm) = (near(&scene.points.points), near(scene.points.firm()));
         let ranges = never::ranges(arm, &reach.stroke);
         leave_out(&bodies, &ranges, &mut moving, &fixed, &mut pairs, &margins);
         let exact = Exact::over(arm.clone(), scene);
-        Ok(Self { bodies, moving, fixed, pairs, field, reach, margins, contact, ranges, exact })
+        Ok(Self {
+            bodies,
+            moving,
+            fixed,
+            pairs,
+            field,
+            firm,
+            reach,
+            margins,
+            contact,
+            ranges,
+            exact,
+        })
     }
 
     /// The link pairs that are not checked, and why; links rigid to each other are not listed.
@@ -88,7 +105,7 @@ impl World {
     }
 
     /// The first link that does not move with the arm (base, torso, other arm) and is too near to
-    /// the scan or to an obstacle that does not carry the robot. Slow: once per stance.
+    /// a point or to an obstacle that does not carry the robot. Slow: once per stance.
     #[must_use]
     pub fn stance_hit(&self) -> Option<Hit> {
         self.exact.stance_hit()
