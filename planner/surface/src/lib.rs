@@ -42,11 +42,12 @@ pub mod scan;
 pub mod patches;
 mod sheet;
 pub mod simulate;
+pub mod unseen;
 
 pub use grid::Grid;
 pub use patches::{Patch, PatchConfig};
 pub use scan::{
-    CleanConfig, CropBox, PlacedScan, Placement, RawScan, ReadOptions, Region, Scan, ScanError,
-    clean, clean_region, place, read,
+    CleanConfig, CropBox, Measured, PlacedScan, Placement, RawScan, ReadOptions, Scan, ScanError,
+    clean, clean_region, measured, place, read,
 };
 pub use sheet::{Surface, SurfacePoint};

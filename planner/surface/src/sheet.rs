@@ -161,6 +161,13 @@ impl Surface {
         Some(line)
     }
 
+    /// The normal of the scan's point nearest to `point`, within 4 cm.
+    #[must_use]
+    pub fn normal_near(&self, point: &Point3<f64>) -> Option<UnitVector3<f64>> {
+        let (nearest, _) = self.grid.nearest(point, REACH, |_| true)?;
+        Some(self.normals[nearest as usize])
+    }
+
     /// Distance from a point to the scanned surface: to the plane through the raw points around
     /// its foot, and beyond their border also along the plane. Infinite farther than 10 cm away.
     /// \[m\]

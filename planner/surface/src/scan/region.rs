@@ -1,8 +1,6 @@
-//! A scan cut in two: the surface to work on, and everything around it.
+//! A part of a scan as the surface to work on.
 
-use std::collections::BTreeMap;
-
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::clean::{CleanConfig, CleanReport, clean};
 use super::cloud::{MIN_POINTS, Scan};
@@ -10,26 +8,9 @@ use super::crop::CropBox;
 use super::error::ScanError;
 use super::place::PlacedScan;
 
-/// Side of the cubes to which the surroundings are thinned. \[m\]
-const SURROUNDINGS_VOXEL: f64 = 0.02;
-
-/// Points that a cube of surroundings needs; a pixel that flies alone is no obstacle.
-const SURROUNDINGS_POINTS: usize = 2;
-
-/// A region and what lies around it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Region {
-    /// The surface inside the box, at full density.
-    pub surface: Scan,
-    /// The points outside, thinned to one in 2 cm: obstacles, no surface. \[m\]
-    pub surroundings: Vec<Point3<f64>>,
-    /// What cleaning the surface did.
-    pub report: CleanReport,
-}
-
-/// Cleans what lies in a box of the floor frame as one scan and thins the rest. In a scene of a
-/// whole room the surface so keeps the density that [`clean()`] of all points would thin away, and
-/// its border is smoothed with what continues beyond it.
+/// Cleans what lies in a box of the floor frame as one scan. In a scene of a whole room the surface
+/// so keeps the density that [`clean()`] of all points would thin away, and its border is smoothed
+/// with what continues beyond it. What lies around it is in [`measured()`](super::measured()).
 ///
 /// # Errors
 /// [`ScanError::EmptyCrop`] if nothing lies in the box, or as [`clean()`].
@@ -37,7 +18,7 @@ pub fn clean_region(
     scan: &PlacedScan,
     region: &CropBox,
     config: &CleanConfig,
-) -> Result<Region, ScanError> {
+) -> Result<(Scan, CleanReport), ScanError> {
     // Refuses an empty box before its margin is taken for content.
     scan.crop(region)?;
     let margin = Vector3::repeat(2.0 * config.radius);
@@ -52,22 +33,5 @@ pub fn clean_region(
             radius: report.radius,
         });
     }
-    Ok(Region { surface, surroundings: surroundings(scan, region), report })
-}
-
-fn surroundings(scan: &PlacedScan, region: &CropBox) -> Vec<Point3<f64>> {
-    let mut cells: BTreeMap<[i64; 3], (Vector3<f64>, usize)> = BTreeMap::new();
-    for point in scan.views.iter().flat_map(|view| &view.points) {
-        if !region.contains(point) {
-            let key = [0, 1, 2].map(|axis| (point[axis] / SURROUNDINGS_VOXEL).floor() as i64);
-            let cell = cells.entry(key).or_insert((Vector3::zeros(), 0));
-            cell.0 += point.coords;
-            cell.1 += 1;
-        }
-    }
-    cells
-        .into_values()
-        .filter(|(_, count)| *count >= SURROUNDINGS_POINTS)
-        .map(|(sum, count)| Point3::from(sum / count as f64))
-        .collect()
+    Ok((surface, report))
 }

@@ -1,0 +1,244 @@
+//! What no view has seen: the space behind what was measured.
+//!
+//! Each sensor's measurements are sorted by direction. A place is *unseen* if it lies behind the
+//! farthest measurement in its direction, as some sensor sees it, and no sensor has looked through
+//! it. Directions without a measurement say nothing: a scan that was cropped would else be walled
+//! in.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use crate::scan::{PlacedScan, Scan, View};
+
+/// Side of the cells of space. \[m\]
+const CELL: f64 = 0.01;
+/// A place counts as unseen from so far behind what was measured: so deep may the sensor be wrong,
+/// and so thin may a thing be. \[m\]
+pub const DEPTH: f64 = 0.02;
+/// How far the unseen is looked at around the surface. \[m\]
+const AROUND: f64 = 0.6;
+/// Directions are told apart by this angle, and by no less than a few measurements. \[rad\]
+const DIRECTION: f64 = 0.5 * PI / 180.0;
+/// Measurements that a direction should have, across.
+const ACROSS: f64 = 2.5;
+/// Directions around one without a measurement that make it a gap in what they saw.
+const RING: usize = 5;
+
+/// The border of the unseen space around a surface, as centres of cells 1 cm apart; nothing where
+/// no view has a known sensor. Below the floor (z = 0) is no space. \[m\]
+#[must_use]
+pub fn border(scan: &PlacedScan, surface: &Scan) -> Vec<Point3<f64>> {
+    let eyes: Vec<Eye> = scan.views.iter().filter_map(|view| Eye::of(view, surface)).collect();
+    if eyes.is_empty() {
+        return Vec::new();
+    }
+    let space = Space::around(surface);
+    let unseen: Vec<bool> =
+        (0..space.len()).into_par_iter().map(|i| is_unseen(&eyes, &space.centre(i))).collect();
+    (0..space.len())
+        .filter(|&i| unseen[i] && space.neighbours(i).any(|n| n.is_none_or(|n| !unseen[n])))
+        .map(|i| space.centre(i))
+        .collect()
+}
+
+fn is_unseen(eyes: &[Eye], place: &Point3<f64>) -> bool {
+    let mut hidden = false;
+    for eye in eyes {
+        match eye.sees(place) {
+            Sight::Through => return false,
+            Sight::Behind => hidden = true,
+            Sight::Nothing => {}
+        }
+    }
+    hidden
+}
+
+/// What a sensor says of a place.
+enum Sight {
+    /// It has measured something behind it.
+    Through,
+    /// It has measured only what is well in front of it.
+    Behind,
+    /// It has measured nothing there, or just there.
+    Nothing,
+}
+
+/// A sensor and how far it saw, by direction.
+struct Eye {
+    at: Point3<f64>,
+    /// Turns z into the middle of what it saw.
+    turn: UnitQuaternion<f64>,
+    angle: f64,
+    columns: usize,
+    /// Least and largest distance measured in each direction; the largest is 0 where there is none.
+    /// \[m\]
+    range: Vec<(f32, f32)>,
+}
+
+impl Eye {
+    /// The sensor of a view, if it is known.
+    fn of(view: &View, surface: &Scan) -> Option<Self> {
+        let at = view.sensor?;
+        let mean: Vector3<f64> = view.points.iter().map(|p| (p - at).normalize()).sum();
+        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &mean)?;
+        let distances: f64 = view.points.iter().map(|p| (p - at).norm()).sum();
+        let distance = distances / view.points.len().max(1) as f64;
+        let angle = DIRECTION.max(ACROSS * surface.spacing / distance.max(1e-3));
+        let (columns, rows) = ((2.0 * PI / angle) as usize + 1, (PI / angle) as usize + 1);
+        let range = vec![(f32::INFINITY, 0.0); columns * rows];
+        let mut eye = Self { at, turn, angle, columns, range };
+        for p in &view.points {
+            let (direction, distance) = eye.look(p);
+            if let Some((least, most)) = eye.range.get_mut(direction) {
+                *least = least.min(distance);
+                *most = most.max(distance);
+            }
+        }
+        eye.close_gaps();
+        Some(eye)
+    }
+
+    /// The direction of a place, and its distance. \[m\]
+    fn look(&self, place: &Point3<f64>) -> (usize, f32) {
+        let v = self.turn.inverse_transform_vector(&(place - self.at));
+        let column = (v.x.atan2(v.z) + PI) / self.angle;
+        let row = (v.y.atan2(v.x.hypot(v.z)) + FRAC_PI_2) / self.angle;
+        (row as usize * self.columns + column as usize, v.norm() as f32)
+    }
+
+    /// Gives directions that saw nothing, but are surrounded by others that did, what those saw.
+    fn close_gaps(&mut self) {
+        let seen = self.range.clone();
+        let at = |i: usize, offset: isize| seen.get(i.checked_add_signed(offset)?).copied();
+        let columns = self.columns as isize;
+        let ring = [-columns - 1, -columns, -columns + 1, -1, 1, columns - 1, columns, columns + 1];
+        for (i, range) in self.range.iter_mut().enumerate().filter(|(_, r)| r.1 == 0.0) {
+            let around: Vec<_> =
+                ring.iter().filter_map(|&o| at(i, o)).filter(|r| r.1 > 0.0).collect();
+            if around.len() >= RING {
+                *range = around
+                    .iter()
+                    .fold((f32::INFINITY, 0.0), |(least, most), r| (least.min(r.0), most.max(r.1)));
+            }
+        }
+    }
+
+    fn sees(&self, place: &Point3<f64>) -> Sight {
+        let (direction, distance) = self.look(place);
+        match self.range.get(direction) {
+            Some(&(_, most)) if most > 0.0 && distance > most + DEPTH as f32 => Sight::Behind,
+            Some(&(least, _)) if distance < least => Sight::Through,
+            _ => Sight::Nothing,
+        }
+    }
+}
+
+/// Cells of the space around a surface, x fastest.
+struct Space {
+    low: Point3<f64>,
+    size: [usize; 3],
+}
+
+impl Space {
+    fn around(surface: &Scan) -> Self {
+        let first = surface.points.first().copied().unwrap_or_default();
+        let (mut low, mut high) = (first, first);
+        for p in &surface.points {
+            (low, high) = (low.inf(p), high.sup(p));
+        }
+        let grow = Vector3::repeat(AROUND);
+        (low, high) = (low - grow, high + grow);
+        low.z = low.z.max(0.0);
+        let size = [0, 1, 2].map(|i| ((high[i] - low[i]).max(0.0) / CELL).ceil() as usize);
+        Self { low, size }
+    }
+
+    fn len(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    fn place(&self, i: usize) -> [usize; 3] {
+        let [x, y, _] = self.size;
+        [i % x, i / x % y, i / (x * y)]
+    }
+
+    fn centre(&self, i: usize) -> Point3<f64> {
+        self.low + Vector3::from(self.place(i).map(|n| (n as f64 + 0.5) * CELL))
+    }
+
+    /// The six cells beside one; `None` for one beyond the space, none below it: there is the floor.
+    fn neighbours(&self, i: usize) -> impl Iterator<Item = Option<usize>> {
+        let [x, y, z] = self.place(i);
+        let [nx, ny, nz] = self.size;
+        [
+            Some((x > 0).then(|| i - 1)),
+            Some((x + 1 < nx).then_some(i + 1)),
+            Some((y > 0).then(|| i - nx)),
+            Some((y + 1 < ny).then_some(i + nx)),
+            (z > 0 || self.low.z > 0.0).then(|| (z > 0).then(|| i - nx * ny)),
+            Some((z + 1 < nz).then_some(i + nx * ny)),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitVector3;
+
+    use super::*;
+
+    /// A plate of 40 × 40 cm at height 1 m over the origin, seen from a place.
+    fn plate(sensor: Option<Point3<f64>>) -> (View, Scan) {
+        let points: Vec<Point3<f64>> = (0..10_000)
+            .map(|i| {
+                let at = |n: i32| 0.004 * f64::from(n) - 0.2;
+                Point3::new(at(i % 100), at(i / 100), 1.0)
+            })
+            .collect();
+        let up = UnitVector3::new_normalize(Vector3::z());
+        let surface = Scan {
+            normals: vec![up; points.len()],
+            raw: points.clone(),
+            points: points.clone(),
+            spacing: 0.004,
+        };
+        (View { points, normals: None, sensor }, surface)
+    }
+
+    #[test]
+    fn behind_a_plate_is_unseen_and_beside_it_is_not() {
+        let (view, surface) = plate(Some(Point3::new(0.0, 0.0, 2.0)));
+        let eye = [Eye::of(&view, &surface).unwrap()];
+        assert!(is_unseen(&eye, &Point3::new(0.05, 0.05, 0.9)));
+        assert!(is_unseen(&eye, &Point3::new(0.25, 0.0, 0.7)), "the shadow widens");
+        assert!(!is_unseen(&eye, &Point3::new(0.05, 0.05, 0.99)), "as thin as that may be seen");
+        assert!(!is_unseen(&eye, &Point3::new(0.05, 0.05, 1.1)));
+        assert!(!is_unseen(&eye, &Point3::new(0.3, 0.0, 0.9)));
+        // A second sensor below looks through it.
+        let (below, _) = plate(Some(Point3::new(0.0, 0.0, 0.2)));
+        let both = [&view, &below].map(|view| Eye::of(view, &surface).unwrap());
+        assert!(!is_unseen(&both, &Point3::new(0.05, 0.05, 0.9)));
+        assert!(!is_unseen(&both, &Point3::new(0.05, 0.05, 1.1)));
+    }
+
+    #[test]
+    fn the_border_encloses_the_shadow() {
+        let (view, surface) = plate(Some(Point3::new(0.0, 0.0, 2.0)));
+        let border = border(&PlacedScan { views: vec![view] }, &surface);
+        let near = |p: Point3<f64>| border.iter().any(|b| (b - p).norm() < 0.02);
+        assert!(near(Point3::new(0.0, 0.0, 0.97)), "right behind the plate");
+        assert!(near(Point3::new(0.3, 0.0, 0.5)), "the side of the shadow");
+        assert!(!near(Point3::new(0.0, 0.0, 0.7)), "deep inside");
+        assert!(border.iter().all(|p| p.z < 0.99 && p.z > 0.0));
+    }
+
+    #[test]
+    fn a_scan_without_a_sensor_hides_nothing() {
+        let (view, surface) = plate(None);
+        assert!(border(&PlacedScan { views: vec![view] }, &surface).is_empty());
+    }
+}
