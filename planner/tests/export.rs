@@ -29,6 +29,7 @@ fn plan(profile: Profile) -> Plan {
         surface: Vec::new(),
         continues: None,
         past: Vec::new(),
+        seal: None,
     }
 }
 

@@ -28,6 +28,9 @@ pub(super) struct PublishArgs {
     /// Wait for the plan's end as well.
     #[arg(long)]
     wait: bool,
+    /// Send a plan that was not verified, or that was changed since.
+    #[arg(long)]
+    unverified: bool,
     /// Seconds to wait for the executor's admission.
     #[arg(long, default_value_t = 5.0)]
     timeout: f64,
@@ -35,6 +38,10 @@ pub(super) struct PublishArgs {
 
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     let plan = Plan::read(&args.plan)?;
+    match plan.check_seal() {
+        Err(error) if args.unverified => eprintln!("planner: warning: {error}; it is sent anyway"),
+        checked => checked?,
+    }
     let natural = if plan.continues.is_some() { Join::Knot } else { Join::Stop };
     let join = args.join.map_or(natural, Join::from);
     // An end comes after the plans before it and may be slowed down: be generous.

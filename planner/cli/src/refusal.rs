@@ -10,19 +10,24 @@ use crate::exit::{OK, VIOLATIONS};
 /// Most violations that are told one by one.
 const TOLD: usize = 10;
 
-/// Writes the plan, or tells what it breaks; the exit code.
+/// Writes the plan, sealed as verified, or tells what it breaks; the exit code.
 pub(super) fn write_unless_broken(
     plan: &Plan,
     violations: &[Violation],
     out: &Path,
 ) -> anyhow::Result<u8> {
     if violations.is_empty() {
-        plan.write(out)?;
+        plan.clone().sealed().write(out)?;
         return Ok(OK);
     }
+    tell(violations);
+    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
+    Ok(VIOLATIONS)
+}
+
+/// Says what a plan breaks, one by one.
+pub(super) fn tell(violations: &[Violation]) {
     for v in violations.iter().take(TOLD) {
         eprintln!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail);
     }
-    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
-    Ok(VIOLATIONS)
 }

@@ -264,6 +264,7 @@ mod tests {
             surface: Vec::new(),
             continues: None,
             past: Vec::new(),
+            seal: None,
         }
     }
 

@@ -34,6 +34,20 @@ pub enum PlanError {
         /// Its version.
         found: u32,
     },
+    /// It never passed the last gate.
+    #[error("the plan was not verified")]
+    Unverified,
+    /// A knot is not what was verified.
+    #[error("the plan was changed after it was verified: knot {knot}")]
+    KnotChanged {
+        /// The first such knot.
+        knot: usize,
+    },
+    /// Something else is not what was verified.
+    #[error(
+        "the plan was changed after it was verified: robot, held joints, tool, place, surface or past"
+    )]
+    Changed,
     /// More knots than the wire takes.
     #[error("the plan has {found} knots, the wire takes {MAX_KNOTS}")]
     TooLong {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::curve::Curve;
 use super::error::{FORMAT, PlanError};
 use super::knot::PlanKnot;
+use super::seal::Seal;
 use super::settings::{CostKind, Method, Profile};
 use super::trajectory::Trajectory;
 
@@ -52,6 +53,9 @@ pub struct Plan {
     /// part up to where the next took over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub past: Vec<Stretch>,
+    /// What it was like when it was verified, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seal: Option<Seal>,
 }
 
 /// A part of a plan that was followed.
@@ -138,6 +142,7 @@ impl Plan {
             surface: Vec::new(),
             continues: None,
             past: Vec::new(),
+            seal: None,
         }
     }
 

@@ -6,6 +6,7 @@ pub mod export;
 mod file;
 mod knot;
 mod message;
+mod seal;
 mod settings;
 mod trajectory;
 
@@ -13,5 +14,6 @@ pub use curve::Curve;
 pub use error::{FORMAT, PlanError};
 pub use file::{Continues, Held, Plan, Stretch, SurfaceSample};
 pub use knot::PlanKnot;
+pub use seal::Seal;
 pub use settings::{BLEND_TOLERANCE, CostKind, LIFT, LINE_TOLERANCE, Method, Profile};
 pub use trajectory::Trajectory;
