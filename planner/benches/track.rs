@@ -8,7 +8,7 @@ use divan::{Bencher, black_box};
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use nullsweep_collision::{Obstacle, Options, World};
 use nullsweep_planner::roadmap::{Edge, ToolPath};
-use nullsweep_planner::workcell::{Sample, Workcell, contact_pose, direction, heading_of};
+use nullsweep_planner::workcell::{Bed, Sample, Workcell, contact_pose, direction, heading_of};
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
 use nullsweep_surface::{Scan, Surface, SurfacePoint};
 use rand::{RngExt, SeedableRng};
@@ -31,7 +31,7 @@ struct Setting {
     arm: Arm,
     tool: Tool,
     world: World,
-    surface: Surface,
+    bed: Bed,
     cases: Vec<Case>,
 }
 
@@ -70,7 +70,8 @@ static SETTING: LazyLock<Setting> = LazyLock::new(|| {
     let world =
         World::new(&robot, &arm, &tool, &points, &[floor], &Options::default()).expect("a world");
     let scan = Scan { raw: points.clone(), points, normals, spacing: 0.006 };
-    let mut setting = Setting { arm, tool, world, surface: Surface::new(&scan), cases: Vec::new() };
+    let mut setting =
+        Setting { arm, tool, world, bed: Bed::soft(Surface::new(&scan)), cases: Vec::new() };
     while setting.cases.len() < EDGES {
         let (y, z) = (rng.random_range(-0.5..0.1), rng.random_range(0.5..1.1));
         let way: f64 = rng.random_range(-3.1..3.1);
@@ -100,7 +101,7 @@ fn case(
     turn: f64,
 ) -> Option<Case> {
     let cell = setting.cell();
-    let line = setting.surface.line(a, b, 0.006, 0.07)?;
+    let line = setting.bed.line(a, b, 0.006, 0.07)?;
     let last = line.len() - 1;
     let edge = Edge {
         a: 0,
@@ -172,7 +173,7 @@ fn tool_path(bencher: Bencher<'_, '_>) {
 fn surface_line(bencher: Bencher<'_, '_>) {
     over(bencher, |s, c| {
         let last = c.edge.line.len() - 1;
-        s.surface.line(&c.edge.line[0], &c.edge.line[last], 0.006, 0.07).is_some()
+        s.bed.line(&c.edge.line[0], &c.edge.line[last], 0.006, 0.07).is_some()
     });
 }
 

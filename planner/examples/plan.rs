@@ -5,9 +5,7 @@
 use std::error::Error;
 
 use nalgebra::Vector3;
-use nullsweep_planner::surface::{
-    CleanConfig, Placement, ReadOptions, clean, place, read, simulate,
-};
+use nullsweep_planner::surface::{CleanConfig, Placement, ReadOptions, place, read, simulate};
 use nullsweep_planner::{ArmSpec, CostKind, Job, Robot, Scene, Side, Silent, run};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -22,10 +20,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     };
     let (placed, _) = place(&raw, &placement);
-    let (surface, _) = clean(&placed, &CleanConfig::default())?;
+    let (scene, _) = Scene::seen(&placed, None, &CleanConfig::default())?;
 
     let job = Job { cost: CostKind::Effort, ..Job::new(ArmSpec::pr2(Side::Right)) };
-    let outcome = run(&Robot::pr2(), &Scene::on_floor(surface), &job, &Silent)?;
+    let outcome = run(&Robot::pr2(), &scene, &job, &Silent)?;
 
     let figures = &outcome.figures;
     println!("{:.1} s, {:.1} rad", figures.task_time_s, figures.effort_rad);

@@ -5,15 +5,15 @@
 //! out. The plan may be published where `figures.verification.violations` is empty.
 //!
 //! ```no_run
-//! use nullsweep_planner::surface::{CleanConfig, Placement, ReadOptions, clean, place, read};
+//! use nullsweep_planner::surface::{CleanConfig, Placement, ReadOptions, place, read};
 //! use nullsweep_planner::{ArmSpec, Job, Robot, Scene, Side, Silent, run};
 //!
 //! let raw = read("chair.pcd".as_ref(), &ReadOptions::default())?;
 //! let up = -nalgebra::Vector3::y_axis();
 //! let placement = Placement::UpAndHeight { up, sensor_height: 0.83, support_height: 0.0 };
-//! let (surface, _) = clean(&place(&raw, &placement).0, &CleanConfig::default())?;
+//! let (scene, _) = Scene::seen(&place(&raw, &placement).0, None, &CleanConfig::default())?;
 //! let job = Job::new(ArmSpec::pr2(Side::Right));
-//! let outcome = run(&Robot::pr2(), &Scene::on_floor(surface), &job, &Silent)?;
+//! let outcome = run(&Robot::pr2(), &scene, &job, &Silent)?;
 //! assert!(outcome.figures.verification.violations.is_empty());
 //! outcome.plan.write("plan.json".as_ref())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())

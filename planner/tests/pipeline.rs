@@ -11,9 +11,9 @@ use nullsweep_planner::workcell::stance::Stance;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 
 fn job(method: Method, cost: CostKind) -> Job {
-    let held = vec![("torso_lift_joint".to_owned(), 0.1)];
+    let held = vec![("torso_lift_joint".to_owned(), 0.2)];
     Job {
-        stance: StanceChoice::Given(Stance { base: [-0.04, 0.574, 5.607], held }),
+        stance: StanceChoice::Given(Stance { base: [-0.708, -0.004, 1.047], held }),
         method,
         cost,
         ik_samples: 30,

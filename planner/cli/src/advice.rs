@@ -86,7 +86,6 @@ fn pipeline(error: &PipelineError) -> Option<String> {
 fn task(error: &TaskError) -> Option<String> {
     match error {
         TaskError::NothingMet { .. } => Some("--chain BASE,TIP names the tip link".into()),
-        TaskError::NoTransfer { .. } => Some("try another --seed".into()),
         TaskError::Collision(error) => collision(error),
         _ => None,
     }

@@ -9,7 +9,7 @@ pub const OK: u8 = 0;
 pub const FAILED: u8 = 1;
 /// The command line was wrong (clap's own code).
 pub const USAGE: u8 = 2;
-/// A plan was made but breaks a rule, so it was not written.
+/// A plan breaks a rule; one that was made was not written.
 pub const VIOLATIONS: u8 = 3;
 /// The executor was lost while its answer or a plan's end was waited for.
 pub const LOST: u8 = 4;

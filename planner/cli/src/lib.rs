@@ -17,6 +17,7 @@ mod replan;
 mod robot;
 mod scene;
 mod task;
+mod verify;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
 pub use exit::{FAILED, LOST, OK, USAGE, VIOLATIONS};
@@ -32,7 +33,7 @@ use clap::{Parser, Subcommand};
 #[command(
     name = "planner",
     version,
-    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule and was not written; 4 the executor was lost while it was waited for."
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule; 4 the executor was lost while it was waited for."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -45,6 +46,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     /// Make a plan through given tool poses.
     Task(Box<task::TaskArgs>),
+    /// Check a plan file against the scene that it was made for.
+    Verify(Box<verify::VerifyArgs>),
     /// Send a plan to the executor.
     Publish(publish::PublishArgs),
     /// Replace the plan that runs by one for what it has not swept yet, without a stop.
@@ -71,6 +74,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match cli.command {
         Command::Plan(args) => plan::run(&args),
         Command::Task(args) => task::run(&args),
+        Command::Verify(args) => verify::run(&args),
         Command::Publish(args) => publish::run(&args),
         Command::Replan(args) => replan::run(&args),
         Command::Gtsp(args) => gtsp::run(&args, &mut std::io::stdout().lock())

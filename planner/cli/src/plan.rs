@@ -12,6 +12,7 @@ use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
+use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_report as report;
 use nullsweep_robot::{JointVector, MAX_DOF, Robot, Tool};
@@ -211,6 +212,39 @@ fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
     Ok(code)
 }
 
+/// How the pad lies on the surface, and what the arm was held against, for people.
+pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
+    let mm = |metres: f64| metres * 1e3;
+    let (p, a) = (&v.press, &v.against);
+    let pressed = (mm(p.press_p50_m), mm(p.press_p95_m), mm(p.press_max_m));
+    let facing = (p.facing_p95_rad.to_degrees(), p.facing_max_rad.to_degrees());
+    let unseen = match a.unseen_points {
+        0 => "unseen space free".to_owned(),
+        n => format!("{n} of unseen space"),
+    };
+    let against = format!(
+        "{} points of the surface, {} others, {} raw, {unseen}, {} obstacles",
+        a.surface_points, a.other_points, a.raw_points, a.obstacles
+    );
+    let distance = (mm(v.scan_distance_p95_m), mm(v.scan_distance_max_m));
+    [
+        ("coverage of reachable points", format!("{:.4}", v.coverage_reachable)),
+        ("coverage of all points", format!("{:.4}", v.coverage_all)),
+        ("line deviation, max", format!("{:.3} mm", mm(v.line_deviation_max_m))),
+        ("distance to the scan, p95, max", format!("{:.2}, {:.2} mm", distance.0, distance.1)),
+        (
+            "pressed in, p50, p95, max",
+            format!("{:.1}, {:.1}, {:.1} mm", pressed.0, pressed.1, pressed.2),
+        ),
+        ("facing, p95, max", format!("{:.0}, {:.0}°", facing.0, facing.1)),
+        ("touching, p50", format!("{:.0} %", 100.0 * p.touching_p50)),
+        ("violations", v.violations.len().to_string()),
+        ("  against", against),
+    ]
+    .map(|(name, value)| [name.to_owned(), value])
+    .into()
+}
+
 /// The figures as name and value, for people.
 fn rows(f: &Figures) -> Vec<[String; 2]> {
     let v = &f.verification;
@@ -231,12 +265,8 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     row("jumps", f.jumps.to_string());
     row("dropped patches", f.dropped_patches.to_string());
     row("knots", f.knots.to_string());
-    row("coverage of reachable points", format!("{:.4}", v.coverage_reachable));
-    row("coverage of all points", format!("{:.4}", v.coverage_all));
-    row("line deviation, max", format!("{:.3} mm", v.line_deviation_max_m * 1e3));
-    let distance = (v.scan_distance_p95_m * 1e3, v.scan_distance_max_m * 1e3);
-    row("distance to the scan, p95, max", format!("{:.2}, {:.2} mm", distance.0, distance.1));
-    row("violations", v.violations.len().to_string());
+    rows.extend(verified_rows(v));
+    let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("calculation", format!("{:.2} s", f.calc_time_total_s));
     for (stage, seconds) in &f.calc_time_s {
         row(&format!("  {stage}"), format!("{seconds:.2} s"));

@@ -32,6 +32,13 @@ pub(super) struct SceneArgs {
     /// Height above the floor of what the object stands on; above 0 it becomes a table. [m]
     #[arg(long, value_name = "M", default_value_t = 0.0)]
     support_height: f64,
+    /// Size of that table's top, along x and y of the floor frame, the object in its middle; without
+    /// it the table is taken to reach 0.45 m beyond the object on every side. [m]
+    #[arg(long, value_name = "LxW", requires = "support_height")]
+    table: Option<TableSize>,
+    /// What the space that no view has seen is: kept clear of, or taken for free.
+    #[arg(long, value_enum, default_value = "avoid")]
+    unseen: UnseenArg,
     /// Factor from the file's unit to metres: 0.001 for millimetres.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
@@ -49,6 +56,32 @@ pub(super) enum Demo {
     ChairSeat,
     /// A ride-on toy car.
     BobbyCar,
+}
+
+/// What becomes of the space that no view has seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum UnseenArg {
+    /// Nothing of robot or tool comes deeper than 2 cm into it.
+    Avoid,
+    /// It is free.
+    Free,
+}
+
+/// Length and width of a table top. [m]
+#[derive(Clone, Copy, Debug)]
+struct TableSize([f64; 2]);
+
+impl FromStr for TableSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (length, width) = text.split_once('x').ok_or("LxW is wanted, 1.2x0.8 say")?;
+        let side = |text: &str| match text.trim().parse::<f64>() {
+            Ok(side) if side > 0.0 && side.is_finite() => Ok(side),
+            _ => Err(format!("`{text}` is no length in metres")),
+        };
+        Ok(Self([side(length)?, side(width)?]))
+    }
 }
 
 /// N comma-separated finite numbers.
@@ -86,13 +119,23 @@ pub(super) fn scene(
         None => (read_scans(args, scans, seed, bars)?, None),
     };
     let region = args.crop.or(region);
-    let config = CleanConfig::default();
-    let mut scene = match region {
-        None => Scene::on_floor(scan::clean(&placed, &config)?.0),
-        Some(region) => Scene::from(scan::clean_region(&placed, &region, &config)?),
-    };
+    let (mut scene, flying) = Scene::seen(&placed, region.as_ref(), &CleanConfig::default())?;
+    if !flying.is_empty() {
+        let (flying, all) = (flying.len(), placed.len());
+        bars.note(&format!("{flying} of {all} points fly alone and are taken for nothing"));
+    }
+    if args.unseen == UnseenArg::Free && !scene.unseen.is_empty() {
+        scene.unseen.clear();
+        bars.note("space that no view has seen counts as free");
+    }
     if args.support_height > 0.0 {
-        scene.obstacles.push(table_under(&scene.surface, args.support_height));
+        if args.table.is_none() {
+            bars.note(
+                "the table is taken to reach 0.45 m beyond the object on every side: --table LxW \
+                 gives its size",
+            );
+        }
+        scene.obstacles.push(table_under(&scene.surface, args.support_height, args.table));
     }
     Ok(scene)
 }
@@ -161,20 +204,26 @@ fn isometry(&Numbers([x, y, z, qx, qy, qz, qw]): &Numbers<7>) -> anyhow::Result<
     Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
 }
 
-/// How far a table top reaches beyond the object. [m]
-const TABLE_RIM: f64 = 0.10;
+/// How far a table top of unknown size is taken to reach beyond the object. [m]
+const TABLE_RIM: f64 = 0.45;
 /// Thickness of a table top. [m]
 const TABLE_TOP: f64 = 0.03;
 
 /// A table top under the scan.
-fn table_under(scan: &Scan, height: f64) -> Obstacle {
+fn table_under(scan: &Scan, height: f64, size: Option<TableSize>) -> Obstacle {
     let mut low = Point3::new(f64::INFINITY, f64::INFINITY, height - TABLE_TOP);
     let mut high = Point3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, height);
     for p in &scan.points {
         for axis in 0..2 {
-            low[axis] = low[axis].min(p[axis] - TABLE_RIM);
-            high[axis] = high[axis].max(p[axis] + TABLE_RIM);
+            low[axis] = low[axis].min(p[axis]);
+            high[axis] = high[axis].max(p[axis]);
         }
+    }
+    for axis in 0..2 {
+        let half = 0.5 * (high[axis] - low[axis]);
+        let grow = size.map_or(TABLE_RIM, |TableSize(sides)| 0.5 * sides[axis] - half);
+        low[axis] -= grow;
+        high[axis] += grow;
     }
     Obstacle {
         name: "table".into(),

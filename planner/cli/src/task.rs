@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nalgebra::Isometry3;
+use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::task::{self, TaskConfig, TaskFigures, Tolerance};
 
@@ -27,6 +29,10 @@ pub(super) struct TaskArgs {
     /// and radians or `free`.
     #[arg(long, value_name = "TOLERANCE", default_value = "0,0,0,0,0,free")]
     tolerance: Tolerance,
+    /// Height of the floor in the robot's root frame; without it 0, or just under the lowest pose
+    /// where that is lower. [m]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    floor: Option<f64>,
     /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
     #[arg(long)]
     v_max: Option<f64>,
@@ -52,13 +58,21 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
     let robot = args.robot.robot()?;
     let poses = task::read(&args.poses)?;
     let tool = args.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
+    let collision = args.robot.collision();
+    let floor = args.floor.unwrap_or_else(|| {
+        let floor = task::floor_under(&poses, &tool, collision.margins.environment);
+        bars.note(&format!(
+            "the floor is taken to be at z = {floor:.3} m: --floor says where it is"
+        ));
+        floor
+    });
     let config = TaskConfig {
         arm: args.robot.spec()?,
         tool,
         tolerance: args.tolerance,
         held: Vec::new(),
-        obstacles: Vec::new(),
-        collision: args.robot.collision(),
+        obstacles: vec![Obstacle::floor(Isometry3::translation(0.0, 0.0, floor))],
+        collision,
         v_max: args.v_max,
         rounds: args.rounds.max(1),
         trials: args.trials.max(1),

@@ -34,7 +34,7 @@ fn hurried(mut plan: Plan) -> Plan {
 fn a_sound_plan_is_written_and_one_that_goes_on_from_a_broken_one_is_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = |name: &str| folder.path().join(name);
-    let place = "--base -0.04,0.574,5.607 --torso 0.1";
+    let place = "--base -0.708,-0.004,1.047 --torso 0.2";
     let (code, said) = planner(folder.path(), &format!("{SEAT} {place} --out sound.json"));
     assert_eq!(code, Some(0), "{said}");
     let plan = Plan::read(&file("sound.json")).expect("a plan file");

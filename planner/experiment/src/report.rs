@@ -282,7 +282,7 @@ pub fn look_between(
 
 /// How far the pad's centre is from where it belongs. \[m\]
 fn off_surface(setting: &Setting, pad: &Point3<f64>) -> f64 {
-    let mut distance = setting.surface.distance(pad);
+    let mut distance = setting.bed.surface().distance(pad);
     if distance.is_infinite() {
         // So far off, the nearest point will do.
         let points = setting.scan.points.iter();

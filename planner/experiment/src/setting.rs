@@ -5,7 +5,9 @@ use nullsweep_planner::pipeline::Job;
 use nullsweep_planner::roadmap::{Graph, Nodes, graph};
 use nullsweep_planner::tour::formulation::{self, Stop};
 use nullsweep_planner::workcell::stance::{self, Stance, StanceSearch};
-use nullsweep_planner::workcell::{Sample, contact_pose, direction, middle_out, redundancies};
+use nullsweep_planner::workcell::{
+    Bed, Sample, Scene, contact_pose, direction, middle_out, redundancies,
+};
 use nullsweep_robot::{Arm, ArmError, JointVector, Robot, Solutions, Tool};
 use nullsweep_surface::{Patch, Scan, Surface, patches};
 use rayon::prelude::*;
@@ -21,8 +23,8 @@ pub struct Setting {
     pub stance: Stance,
     /// The scan.
     pub scan: Scan,
-    /// Its surface.
-    pub surface: Surface,
+    /// Its surface, into which the pad may be pressed as deep as it likes.
+    pub bed: Bed,
     /// The patches.
     pub patches: Vec<Patch>,
     /// For each patch a sample that reaches it.
@@ -67,7 +69,8 @@ impl Setting {
         let arm = robot.arm(&job.arm)?;
         let found = patches::find(scan, &job.patches, job.seed);
         let search = StanceSearch { finalists: FINALISTS, ..StanceSearch::default() };
-        let candidates = stance::candidates(robot, &arm, tool, scan, &found, &search)?;
+        let candidates =
+            stance::candidates(robot, &arm, tool, &Scene::on_floor(scan.clone()), &found, &search)?;
         let judged: Vec<Result<(usize, Stance, Arm), ArmError>> = candidates
             .into_par_iter()
             .map(|candidate| {
@@ -93,17 +96,17 @@ impl Setting {
         let to_root = stance.pose().inverse();
         let patches: Vec<Patch> = found.iter().map(|p| p.transformed(&to_root)).collect();
         let scan = scan.transformed(&to_root);
-        let surface = Surface::new(&scan);
+        let bed = Bed::soft(Surface::new(&scan));
         let reached: Vec<Option<Sample>> =
             patches.par_iter().map(|p| reach(&arm, tool, p)).collect();
         let graph = graph::unchecked(
-            Nodes { surface: &surface, patches: &patches, reached: &reached },
+            Nodes { bed: &bed, patches: &patches, reached: &reached },
             &job.graph,
             tool.width,
         );
         let start = arm.home();
         let tool = tool.clone();
-        Ok(Self { arm, tool, stance, scan, surface, patches, reached, graph, start })
+        Ok(Self { arm, tool, stance, scan, bed, patches, reached, graph, start })
     }
 
     /// The pad's contact frame before the first motion.

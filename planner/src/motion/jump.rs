@@ -7,8 +7,9 @@
 
 use nullsweep_robot::JointVector;
 
-use super::retreat::lift;
+use super::retreat::{lift, retract};
 use super::rrt_connect::{Options, rrt_connect};
+use crate::plan::LIFT;
 use crate::workcell::Workcell;
 
 /// The path from one contact (or free configuration) to another: lift off, transfer, set down.
@@ -21,10 +22,33 @@ pub fn jump(
     to: &JointVector,
     seed: u64,
 ) -> Option<Vec<JointVector>> {
-    let options = Options::default();
     let to = cell.arm.continuous().nearest_turn(to, from);
-    let mut path = lift(cell, from)?;
-    let mut down = lift(cell, &to)?;
+    across(cell, lift(cell, from)?, lift(cell, &to)?, seed)
+}
+
+/// As [`jump`], but the tool backs off even where it is free, as far as that goes.
+#[must_use]
+pub fn reconfigure(
+    cell: Workcell<'_>,
+    from: &JointVector,
+    to: &JointVector,
+    seed: u64,
+) -> Option<Vec<JointVector>> {
+    let to = cell.arm.continuous().nearest_turn(to, from);
+    let off = |q: &JointVector| {
+        retract(cell.world, cell.arm, cell.tool, q, LIFT).or_else(|| lift(cell, q))
+    };
+    across(cell, off(from)?, off(&to)?, seed)
+}
+
+/// The path that goes up the first way, through free space, and back the second way.
+fn across(
+    cell: Workcell<'_>,
+    mut path: Vec<JointVector>,
+    mut down: Vec<JointVector>,
+    seed: u64,
+) -> Option<Vec<JointVector>> {
+    let options = Options::default();
     down.reverse();
     let (above, goal) = (path.pop()?, down[0]);
     let across = rrt_connect(cell.world, cell.arm, &above, &goal, &options, seed)?;

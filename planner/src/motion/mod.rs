@@ -9,7 +9,7 @@ mod rrt_connect;
 #[cfg(test)]
 mod tests;
 
-pub use jump::jump;
+pub use jump::{jump, reconfigure};
 pub use mover::{Leg, Mover, lift_cost};
 pub use retreat::{lift, retract};
 pub use rrt_connect::{Options as RrtOptions, rrt_connect};

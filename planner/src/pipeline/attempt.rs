@@ -1,7 +1,7 @@
 //! One plan for one set of patches, and the patches that are put over what it leaves out.
 
 use nullsweep_robot::{JointVector, Robot};
-use nullsweep_surface::{Patch, PatchConfig, Scan, Surface, patches};
+use nullsweep_surface::{Patch, PatchConfig, Scan, patches};
 use rayon::prelude::*;
 
 use super::clock::Clock;
@@ -15,7 +15,7 @@ use crate::roadmap::{Graph, Nodes, graph};
 use crate::sweep::{contact_motion, coverage};
 use crate::tour::formulation::{self, Stop};
 use crate::workcell::stance::Stance;
-use crate::workcell::{Sample, Workcell, reach, redundancies};
+use crate::workcell::{Bed, Sample, Workcell, reach, redundancies};
 
 /// What every attempt at a plan shares, in the root frame.
 pub(super) struct Planning<'a> {
@@ -24,7 +24,7 @@ pub(super) struct Planning<'a> {
     pub(super) stance: &'a Stance,
     pub(super) cell: Workcell<'a>,
     pub(super) scan: &'a Scan,
-    pub(super) surface: &'a Surface,
+    pub(super) bed: &'a Bed,
     pub(super) start: JointVector,
     /// Of each joint. \[rad/s\] or \[m/s\]
     pub(super) velocity: JointVector,
@@ -87,7 +87,7 @@ impl Planning<'_> {
     ) -> Result<Attempt, PipelineError> {
         let Self { job, cell, progress, .. } = *self;
         let graph = clock.time("graph", || {
-            let nodes = Nodes { surface: self.surface, patches: &patches, reached: &visit };
+            let nodes = Nodes { bed: self.bed, patches: &patches, reached: &visit };
             graph::build(cell, nodes, &job.graph, before.map(|b| &b.graph), progress)
         });
         progress.stage("tour", None);
@@ -124,7 +124,8 @@ impl Planning<'_> {
     pub(super) fn fill_in(&self, left: &[bool], min_points: usize) -> Vec<Patch> {
         let epsilon = self.fill_in_radius();
         let config = PatchConfig { epsilon, min_points, ..self.job.patches.clone() };
-        patches::fill_in(self.scan, left, &config, self.job.tool.reach_angle)
+        let found = patches::fill_in(self.scan, left, &config, self.job.tool.reach_angle);
+        found.into_iter().map(|patch| self.bed.raised(patch)).collect()
     }
 
     pub(super) fn fill_in_radius(&self) -> f64 {

@@ -182,10 +182,10 @@ impl<C: Cost> Insertion<'_, C> {
 
     /// A way along the surface from one stop, the pad turned from the line as it is there.
     fn reach_from(&self, stop: usize) -> Option<(Sample, Motion<Leg>)> {
-        let Planning { job, surface, .. } = self.planning;
+        let Planning { job, bed, .. } = self.planning;
         let Visit { patch, sample: from, .. } = &self.visits[stop];
         let edge =
-            Edge::between(surface, self.patches, *patch, self.patch, &job.graph, job.tool.width)?;
+            Edge::between(bed, self.patches, *patch, self.patch, &job.graph, job.tool.width)?;
         let heading = edge.heading_b + from.heading - edge.heading_a;
         let mut targets: Vec<Sample> = self.samples(heading);
         targets.retain(|to| to.branch == from.branch);

@@ -2,7 +2,8 @@
 
 use nullsweep_collision::World;
 use nullsweep_robot::{Arm, JointVector, Robot};
-use nullsweep_surface::{Patch, Scan, Surface, patches};
+use nullsweep_surface::{Patch, Scan, patches};
+use rayon::prelude::*;
 
 use super::attempt::{Attempt, Planning};
 use super::clock::Clock;
@@ -18,7 +19,7 @@ use crate::progress::Progress;
 use crate::roadmap::Graph;
 use crate::timing::{Limits, Rest, accelerate};
 use crate::verify::{Given, verify};
-use crate::workcell::{Sample, Scene, Workcell, reach};
+use crate::workcell::{Bed, Sample, Scene, Workcell, reach};
 
 /// A plan with all that led to it, in the root frame.
 pub struct Outcome {
@@ -52,19 +53,24 @@ pub fn run(
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
     let surface = &scene.surface;
-    let patches = clock.time("patches", || patches::find(surface, &job.patches, job.seed));
+    let patches = clock.time("patches", || {
+        let found = patches::find(surface, &job.patches, job.seed);
+        let bed = Bed::new(scene, &job.tool);
+        found.into_par_iter().map(|patch| bed.raised(patch)).collect::<Vec<_>>()
+    });
     if patches.is_empty() {
         return Err(PipelineError::NoPatches { points: surface.points.len() });
     }
 
     progress.stage("stance", None);
     let setting = clock.time("stance", || settle(robot, &free_arm, scene, &patches, job))?;
-    let Setting { stance, arm, scan, patches, world } = setting;
+    let Setting { stance, arm, scene: here, patches, world } = setting;
+    let scan = &here.surface;
     for note in world.notes() {
         progress.note(note);
     }
     let (start, rest) = begin(job, &arm, &world, progress)?;
-    let already = swept_before(job, rest.as_ref(), &arm, &scan)?;
+    let already = swept_before(job, rest.as_ref(), &arm, scan)?;
 
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
     progress.stage("reach", Some(patches.len()));
@@ -75,18 +81,18 @@ pub fn run(
         return Err(PipelineError::NothingReached { patches: patches.len(), base: stance.base });
     }
     let (found, samples) = (patches.len(), reached);
-    let surface = clock.time("surface", || Surface::new(&scan));
+    let bed = clock.time("surface", || Bed::new(&here, &job.tool));
     let planning = Planning {
         robot,
         job,
         stance: &stance,
         cell,
-        scan: &scan,
-        surface: &surface,
+        scan,
+        bed: &bed,
         start,
         velocity: cost::velocities(&arm, job.v_max),
         continues: job.after.as_ref().map_or(Ok(None), After::continues)?,
-        to_sweep: &points_of(&scan, &patches, &reachable),
+        to_sweep: &points_of(scan, &patches, &reachable),
         already: &already,
         progress,
     };
@@ -117,6 +123,7 @@ pub fn run(
         ..figures(&plan, &arm, &graph, &sequence)
     };
     reachable.resize(patches.len(), true);
+    let scan = here.surface;
     Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
 }
 

@@ -1,9 +1,8 @@
 //! The robot in its place.
 
-use nalgebra::Point3;
 use nullsweep_collision::World;
 use nullsweep_robot::{Arm, Robot};
-use nullsweep_surface::{Patch, Scan, Surface};
+use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
 use super::error::PipelineError;
@@ -12,13 +11,13 @@ use super::start::start;
 use crate::progress::Silent;
 use crate::roadmap::{GraphConfig, Nodes, graph};
 use crate::workcell::stance::{self, Stance, StanceSearch};
-use crate::workcell::{Sample, Scene, Workcell, reach};
+use crate::workcell::{Bed, Sample, Scene, Workcell, reach};
 
 /// The robot in its place: everything in its root frame.
 pub(super) struct Setting {
     pub(super) stance: Stance,
     pub(super) arm: Arm,
-    pub(super) scan: Scan,
+    pub(super) scene: Scene,
     pub(super) patches: Vec<Patch>,
     pub(super) world: World,
 }
@@ -55,18 +54,27 @@ fn search(
     job: &Job,
     options: &StanceSearch,
 ) -> Result<Setting, PipelineError> {
-    let candidates = stance::candidates(robot, arm, &job.tool, &scene.surface, patches, options)?;
+    // In less detail: the best is looked at again.
+    let sketch = scene.sketch();
+    let candidates = stance::candidates(robot, arm, &job.tool, &sketch, patches, options)?;
     let tried = candidates.len();
     // Candidates are looked at side by side, each by itself.
     let open: Vec<Result<Option<Open>, PipelineError>> = candidates
         .into_par_iter()
         .map(|c| {
-            let setting = Setting::new(robot, arm, scene, patches, job, c.stance)?;
+            let setting = Setting::new(robot, arm, &sketch, patches, job, c.stance)?;
             Ok(setting.open(job))
         })
         .collect();
-    let open: Result<Vec<_>, _> = open.into_iter().filter_map(Result::transpose).collect();
-    best_of(open?, job).ok_or(PipelineError::NoStance { tried, patches: patches.len() })
+    let mut open = open.into_iter().filter_map(Result::transpose).collect::<Result<Vec<_>, _>>()?;
+    while let Some(best) = best_of(&open, job) {
+        let stance = open.remove(best).setting.stance;
+        let setting = Setting::new(robot, arm, scene, patches, job, stance)?;
+        if setting.stands(job) {
+            return Ok(setting);
+        }
+    }
+    Err(PipelineError::NoStance { tried, patches: patches.len() })
 }
 
 /// A stance that reaches something, not yet looked at as a whole.
@@ -77,23 +85,25 @@ struct Open {
     most: usize,
 }
 
-/// The setting with the best score, the earlier one of two that are alike. Those that promise most
-/// are scored first, some side by side, until none that is left could be better.
-fn best_of(mut open: Vec<Open>, job: &Job) -> Option<Setting> {
-    open.sort_by_key(|entry| std::cmp::Reverse(entry.most));
-    let mut open = open.into_iter().peekable();
-    let mut best: Option<(usize, Setting)> = None;
-    while open.peek().is_some_and(|next| best.as_ref().is_none_or(|(s, _)| next.most > *s)) {
-        let batch: Vec<Open> = open.by_ref().take(SIDE_BY_SIDE).collect();
+/// The index of the setting with the best score, the earlier one of two that are alike. Those that
+/// promise most are scored first, some side by side, until none that is left could be better.
+fn best_of(open: &[Open], job: &Job) -> Option<usize> {
+    let mut order: Vec<usize> = (0..open.len()).collect();
+    order.sort_by_key(|&i| std::cmp::Reverse(open[i].most));
+    let mut best: Option<(usize, usize)> = None;
+    for batch in order.chunks(SIDE_BY_SIDE) {
+        if best.is_some_and(|(score, _)| open[batch[0]].most <= score) {
+            break;
+        }
         let scores: Vec<usize> =
-            batch.par_iter().map(|entry| entry.setting.score(job, &entry.reached)).collect();
-        for (score, entry) in scores.into_iter().zip(batch) {
-            if best.as_ref().is_none_or(|(s, _)| score > *s) {
-                best = Some((score, entry.setting));
+            batch.par_iter().map(|&i| open[i].setting.score(job, &open[i].reached)).collect();
+        for (score, &i) in scores.into_iter().zip(batch) {
+            if best.is_none_or(|(s, _)| score > s) {
+                best = Some((score, i));
             }
         }
     }
-    best.map(|(_, setting)| setting)
+    best.map(|(_, i)| i)
 }
 
 impl Setting {
@@ -108,20 +118,24 @@ impl Setting {
         let arm = stance.bind(arm)?;
         let to_root = stance.pose().inverse();
         let patches: Vec<Patch> = patches.iter().map(|p| p.transformed(&to_root)).collect();
-        let Scene { surface: scan, surroundings, obstacles } = scene.transformed(&to_root);
-        let points: Vec<Point3<f64>> = scan.points.iter().copied().chain(surroundings).collect();
-        let world = World::new(robot, &arm, &job.tool, &points, &obstacles, &job.collision)?;
-        Ok(Self { stance, arm, scan, patches, world })
+        let scene = scene.transformed(&to_root);
+        let (points, obstacles) = (scene.points(), &scene.obstacles);
+        let world = World::new(robot, &arm, &job.tool, points, obstacles, &job.collision)?;
+        Ok(Self { stance, arm, scene, patches, world })
     }
 
     fn cell<'a>(&'a self, job: &'a Job) -> Workcell<'a> {
         Workcell { arm: &self.arm, tool: &job.tool, world: &self.world }
     }
 
+    /// Whether neither body nor start posture collides.
+    fn stands(&self, job: &Job) -> bool {
+        start(job, &self.arm, &self.world).is_ok() && self.world.stance_hit().is_none()
+    }
+
     /// What the stance reaches; `None` where body or start posture collide, or it is nothing.
     fn open(self, job: &Job) -> Option<Open> {
-        start(job, &self.arm, &self.world).ok()?;
-        if self.world.stance_hit().is_some() {
+        if !self.stands(job) {
             return None;
         }
         let reached = reach(self.cell(job), &self.patches, job.ik_samples, &|| ());
@@ -133,9 +147,9 @@ impl Setting {
     /// Points of reached patches, each weighed by the edges that lead on from its patch, up to
     /// `WELL_JOINED`.
     fn score(&self, job: &Job, reached: &[Option<Sample>]) -> usize {
-        let surface = Surface::new(&self.scan);
+        let bed = Bed::new(&self.scene, &job.tool);
         let config = GraphConfig { edge_samples: 24, ..job.graph };
-        let nodes = Nodes { surface: &surface, patches: &self.patches, reached };
+        let nodes = Nodes { bed: &bed, patches: &self.patches, reached };
         let graph = graph::build(self.cell(job), nodes, &config, None, &Silent);
         (0..self.patches.len())
             .filter(|&i| reached[i].is_some())

@@ -1,9 +1,9 @@
 //! A way along the surface between two patches.
 
-use nullsweep_surface::{Patch, Surface, SurfacePoint};
+use nullsweep_surface::{Patch, SurfacePoint};
 use serde::{Deserialize, Serialize};
 
-use crate::workcell::heading_of;
+use crate::workcell::{Bed, heading_of};
 
 /// How the graph is built.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,7 +48,7 @@ impl Edge {
     /// of the normal along it: as long as the pad is wide. \[m\]
     #[must_use]
     pub fn between(
-        surface: &Surface,
+        bed: &Bed,
         patches: &[Patch],
         a: usize,
         b: usize,
@@ -56,7 +56,7 @@ impl Edge {
         wave: f64,
     ) -> Option<Self> {
         let end = |i: usize| SurfacePoint { point: patches[i].centre, normal: patches[i].normal };
-        let line = surface.line(&end(a), &end(b), config.line_step, wave)?;
+        let line = bed.line(&end(a), &end(b), config.line_step, wave)?;
         let last = line.len() - 1;
         Some(Self {
             a,

@@ -3,13 +3,13 @@
 use std::collections::HashSet;
 
 use nalgebra::Isometry3;
-use nullsweep_surface::{Patch, Surface};
+use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
 use super::edge::{Edge, GraphConfig};
 use super::path::ToolPath;
 use crate::progress::Progress;
-use crate::workcell::{Sample, Workcell, contact_pose, direction, middle_out, redundancies};
+use crate::workcell::{Bed, Sample, Workcell, contact_pose, direction, middle_out, redundancies};
 
 /// Turns of the pad from the direction of travel that are tried, the paper's own first: the long
 /// side across the travel. \[°\]
@@ -61,8 +61,8 @@ impl Graph {
 /// What a graph is built over.
 #[derive(Clone, Copy)]
 pub struct Nodes<'a> {
-    /// The scanned surface.
-    pub surface: &'a Surface,
+    /// What the pad lies on.
+    pub bed: &'a Bed,
     /// Its patches.
     pub patches: &'a [Patch],
     /// A sample of each patch that is to be a node.
@@ -81,7 +81,7 @@ pub fn build(
     before: Option<&Graph>,
     progress: &dyn Progress,
 ) -> Graph {
-    let Nodes { surface, patches, reached } = nodes;
+    let Nodes { bed, patches, reached } = nodes;
     let pairs = neighbour_pairs(patches, reached, config);
     progress.stage("graph", Some(pairs.len()));
     let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
@@ -90,7 +90,7 @@ pub fn build(
         .map(|&(a, b)| {
             let known = before.and_then(|graph| graph.known(a, b));
             let edge = known.unwrap_or_else(|| {
-                let edge = Edge::between(surface, patches, a, b, config, cell.tool.width)?;
+                let edge = Edge::between(bed, patches, a, b, config, cell.tool.width)?;
                 let mut turned: Vec<TurnedEdge> =
                     TURNS.iter().map(|turn| TurnedEdge::new(cell, patches, &edge, *turn)).collect();
                 let even = turned.iter_mut().position(|edge| edge.is_followed(cell, &values));
@@ -110,10 +110,10 @@ pub fn build(
 /// neighbours joined wherever a surface line leads.
 #[must_use]
 pub fn unchecked(nodes: Nodes<'_>, config: &GraphConfig, wave: f64) -> Graph {
-    let Nodes { surface, patches, reached } = nodes;
+    let Nodes { bed, patches, reached } = nodes;
     let (mut edges, mut apart) = (Vec::new(), Vec::new());
     for (a, b) in neighbour_pairs(patches, reached, config) {
-        match Edge::between(surface, patches, a, b, config, wave) {
+        match Edge::between(bed, patches, a, b, config, wave) {
             Some(edge) => edges.push(edge),
             None => apart.push((a, b)),
         }

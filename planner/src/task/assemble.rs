@@ -19,15 +19,22 @@ pub(super) fn assemble(
 ) -> Plan {
     let knot = |q, line, patch| PlanKnot { time_ns: 0, q, v: JointVector::default(), line, patch };
     let mut knots: Vec<PlanKnot> = Vec::new();
+    // Whole turns of continuous joints that the ways through free space have left out.
+    let mut turns = JointVector::ZERO;
     for (k, &pose) in route.order.iter().enumerate() {
         let point = &route.points[pose];
-        let through = k.checked_sub(1).and_then(|e| edges[e].as_ref());
-        if let Some([_, between @ .., _]) = through.map(Vec::as_slice) {
-            knots.extend(between.iter().map(|q| knot(*q, None, None)));
+        if let Some(through) = k.checked_sub(1).and_then(|e| edges[e].as_ref()) {
+            let (first, last) = (through[0], through[through.len() - 1]);
+            let between = &through[1..through.len() - 1];
+            // A straight one too is marked as one that leaves the surface.
+            let middle = [first.lerp(&last, 0.5)];
+            let between = if between.is_empty() { &middle } else { between };
+            knots.extend(between.iter().map(|q| knot(*q + turns, None, None)));
+            turns = turns + (last - point.q);
         }
         let at = point.tool.translation.vector;
         let line = Some([at.x, at.y, at.z]);
-        knots.push(knot(point.q, line, Some(pose as u32)));
+        knots.push(knot(point.q + turns, line, Some(pose as u32)));
     }
     timing::set_times(&mut knots, &cost::velocities(arm, config.v_max));
     Plan {

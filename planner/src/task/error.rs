@@ -24,14 +24,6 @@ pub enum TaskError {
         /// How many there are.
         poses: usize,
     },
-    /// No way through free space between two poses.
-    #[error("no motion through free space was found from pose {from} to pose {to}")]
-    NoTransfer {
-        /// The pose before.
-        from: usize,
-        /// The pose after.
-        to: usize,
-    },
     /// The finished plan cannot be checked.
     #[error("checking the plan: {0}")]
     Verify(#[from] VerifyError),

@@ -14,7 +14,7 @@ mod run;
 mod search;
 mod space;
 
-pub use config::{TaskConfig, tip_tool};
+pub use config::{TaskConfig, floor_under, tip_tool};
 pub use error::TaskError;
 pub use figures::TaskFigures;
 pub use read::{PosesError, Tolerance, read};

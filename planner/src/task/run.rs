@@ -14,11 +14,11 @@ use super::route::Route;
 use super::search::search;
 use super::space::{Point, RESIDUAL, Space};
 use crate::cost::{self, Effort};
-use crate::motion::{RrtOptions, rrt_connect};
+use crate::motion::reconfigure;
 use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::verify::{Given, Verification, verify};
-use crate::workcell::Scene;
+use crate::workcell::{Scene, Workcell};
 
 /// The plan and its figures.
 #[derive(Clone, Debug)]
@@ -46,11 +46,12 @@ pub fn run(
     let arm = robot.arm(&config.arm)?.with_held(&held)?;
     let world = World::new(robot, &arm, &config.tool, &[], &config.obstacles, &config.collision)?;
     let space = Space::new(&arm, &world, &config.tool, &config.tolerance);
-    let (route, unmet) = search(space, poses, config, progress)?;
+    let (mut route, unmet) = search(space, poses, config, progress)?;
     for pose in unmet {
         progress.note(&format!("pose {pose} is left out: no joint vector meets it"));
     }
-    let edges = edges(&space, &route, config.seed)?;
+    let cell = Workcell { arm: &arm, tool: &config.tool, world: &world };
+    let edges = connect(&space, cell, &mut route, config.seed, progress);
     let plan = assemble(robot, &arm, poses, &route, &edges, config);
     let calc_time_s = started.elapsed().as_secs_f64();
 
@@ -90,26 +91,39 @@ fn pairs(route: &Route) -> impl Iterator<Item = (&Point, &Point)> {
     route.order.windows(2).map(|w| (&route.points[w[0]], &route.points[w[1]]))
 }
 
-/// For each edge the way through free space, where it is a reconfiguration or collides.
-fn edges(
+/// For each edge of the route the way through free space, where it is a reconfiguration or collides.
+/// A pose that none leads to is taken out of the route.
+fn connect(
     space: &Space<'_>,
-    route: &Route,
+    cell: Workcell<'_>,
+    route: &mut Route,
     seed: u64,
-) -> Result<Vec<Option<Vec<JointVector>>>, TaskError> {
-    let options = RrtOptions::default();
-    pairs(route)
-        .enumerate()
-        .map(|(k, (a, b))| {
-            if !space.is_reconfiguration(a, b)
-                && space.world.motion_free(&a.q, &b.q, ToolContact::Allowed)
-            {
-                return Ok(None);
-            }
-            let path = rrt_connect(space.world, space.arm, &a.q, &b.q, &options, seed);
-            let (from, to) = (route.order[k], route.order[k + 1]);
-            path.map(Some).ok_or(TaskError::NoTransfer { from, to })
-        })
-        .collect()
+    progress: &dyn Progress,
+) -> Vec<Option<Vec<JointVector>>> {
+    let mut order: Vec<usize> = Vec::new();
+    let mut edges = Vec::new();
+    for &pose in &route.order {
+        let Some(&last) = order.last() else {
+            order.push(pose);
+            continue;
+        };
+        let (a, b) = (&route.points[last], &route.points[pose]);
+        let goes_straight = !space.is_reconfiguration(a, b)
+            && space.world.motion_free(&a.q, &b.q, ToolContact::Allowed);
+        if goes_straight {
+            edges.push(None);
+        } else if let Some(path) = reconfigure(cell, &a.q, &b.q, seed) {
+            edges.push(Some(path));
+        } else {
+            progress.note(&format!(
+                "pose {pose} is left out: no motion through free space was found from pose {last}"
+            ));
+            continue;
+        }
+        order.push(pose);
+    }
+    route.order = order;
+    edges
 }
 
 /// Largest distance of the tool from the straight line along an edge. \[m\]

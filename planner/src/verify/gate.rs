@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::collisions::{collisions, standing};
 use super::kinematics::kinematics;
+use super::press::{Press, press};
 use super::violation::{Violation, ViolationKind};
 use crate::plan::{Plan, PlanError, Stretch};
 use crate::sweep::{Pad, coverage, pad_motion};
@@ -28,6 +29,11 @@ pub struct Verification {
     pub scan_distance_p95_m: f64,
     /// The largest of those. \[m\]
     pub scan_distance_max_m: f64,
+    /// How the pad lies on the surface.
+    #[serde(flatten)]
+    pub press: Press,
+    /// What the arm was held against.
+    pub against: Against,
     /// Share of all scanned points that are swept, by this plan or by those that led to it.
     pub coverage_all: f64,
     /// Share of the points of reachable patches that are so swept.
@@ -35,6 +41,33 @@ pub struct Verification {
     /// For each scanned point whether it is swept.
     #[serde(skip)]
     pub swept: Vec<bool>,
+}
+
+/// What the arm was held against: how many of each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Against {
+    /// Points of the surface.
+    pub surface_points: usize,
+    /// Measured points beside it.
+    pub other_points: usize,
+    /// Measurements that the surface was made of.
+    pub raw_points: usize,
+    /// Points on the border of what no view has seen; 0: unseen space counts as free.
+    pub unseen_points: usize,
+    /// Solid things.
+    pub obstacles: usize,
+}
+
+impl Against {
+    fn of(scene: &Scene) -> Self {
+        Self {
+            surface_points: scene.surface.points.len(),
+            other_points: scene.surroundings.len(),
+            raw_points: scene.raw.len(),
+            unseen_points: scene.unseen.len(),
+            obstacles: scene.obstacles.len(),
+        }
+    }
 }
 
 /// What a plan is held against: the robot and the scene as they were given, none of what the search
@@ -50,6 +83,9 @@ pub struct Given<'a> {
     /// Collision margins and meshes.
     pub collision: &'a Options,
 }
+
+/// Rounding between a point of a plan and the same point of its scene. \[m\]
+const SAME_PLACE: f64 = 1e-6;
 
 /// Why a plan cannot be checked.
 #[derive(Debug, thiserror::Error)]
@@ -85,6 +121,17 @@ pub enum VerifyError {
         /// Points in the scene.
         found: usize,
     },
+    /// The plan is of a scan as long, but elsewhere.
+    #[error(
+        "point {point} of the scan lies {distance_m:.4} m from where the plan has it: the scene is \
+         another one, or placed otherwise"
+    )]
+    MovedScan {
+        /// The first such point.
+        point: usize,
+        /// \[m\]
+        distance_m: f64,
+    },
 }
 
 /// Checks limits, times and collisions of a plan, and measures line, distance and swept coverage,
@@ -107,6 +154,14 @@ pub fn verify(
         let (planned, found) = (plan.surface.len(), scan.points.len());
         return Err(VerifyError::OtherScan { planned, found });
     }
+    if is_scanned {
+        for (point, (sample, scanned)) in plan.surface.iter().zip(&scan.points).enumerate() {
+            let distance_m = (Point3::from(sample.point) - scanned).norm();
+            if distance_m > SAME_PLACE || distance_m.is_nan() {
+                return Err(VerifyError::MovedScan { point, distance_m });
+            }
+        }
+    }
     let mut violations = kinematics(plan, &arm);
     let is_finite = !violations.iter().any(|v| v.kind == ViolationKind::NotFinite);
     if !is_finite || plan.knots.len() < 2 {
@@ -114,7 +169,7 @@ pub fn verify(
         return Ok(Verification { violations, ..Verification::default() });
     }
     let (points, obstacles) = (scene.points(), &scene.obstacles);
-    let exact = Exact::new(given.robot, &arm, &plan.tool, &points, obstacles, given.collision)?;
+    let exact = Exact::new(given.robot, &arm, &plan.tool, points, obstacles, given.collision)?;
     violations.extend(standing(&exact));
     let (collisions, collision_checks) = collisions(plan, &arm, &exact, tick);
     violations.extend(collisions);
@@ -137,6 +192,8 @@ pub fn verify(
         collision_checks,
         line_deviation_max_m,
         scan_distance_p95_m: percentile(&distances, 0.95),
+        press: press(&scene, &poses, &plan.tool),
+        against: Against::of(&scene),
         scan_distance_max_m: distances.last().copied().unwrap_or(0.0),
         coverage_all: share(&|_| true),
         coverage_reachable: share(&|i| plan.surface[i].reachable),
@@ -170,7 +227,7 @@ fn distances(plan: &Plan, scan: &Scan, pads: &[Pad]) -> Vec<f64> {
     distances
 }
 
-fn percentile(sorted: &[f64], share: f64) -> f64 {
+pub(super) fn percentile(sorted: &[f64], share: f64) -> f64 {
     let last = sorted.len().saturating_sub(1);
     sorted.get((share * last as f64).round() as usize).copied().unwrap_or(0.0)
 }

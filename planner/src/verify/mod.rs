@@ -11,7 +11,9 @@
 mod collisions;
 mod gate;
 mod kinematics;
+mod press;
 mod violation;
 
-pub use gate::{Given, Verification, VerifyError, verify};
+pub use gate::{Against, Given, Verification, VerifyError, verify};
+pub use press::Press;
 pub use violation::{Violation, ViolationKind};

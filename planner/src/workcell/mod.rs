@@ -1,11 +1,13 @@
 //! The arm in its place: what it reaches, and where the robot stands.
 
+mod bed;
 mod contact;
 mod reach;
 mod sample;
 mod scene;
 pub mod stance;
 
+pub use bed::Bed;
 pub use contact::{contact_pose, direction, heading_of, tangents};
 pub use reach::reach;
 pub use sample::{Sample, Workcell, middle_out, redundancies};

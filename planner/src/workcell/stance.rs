@@ -2,14 +2,15 @@
 
 use nalgebra::{Isometry3, Point3, Rotation2, Vector2, Vector3};
 use nullsweep_robot::{
-    Arm, ArmError, CollisionShape, Geometry, JointVector, Robot, Solutions, Tool,
+    Arm, ArmError, CollisionShape, Geometry, JointVector, Robot, Solutions, Tool, wrap,
 };
-use nullsweep_surface::{Patch, Scan};
+use nullsweep_surface::Patch;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::contact::{contact_pose, direction};
 use super::sample::redundancies;
+use super::scene::Scene;
 
 /// The pose of the robot's root frame on the floor and the positions of joints outside the arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -131,13 +132,15 @@ pub struct Candidate {
 const REDUNDANCIES: usize = 12;
 /// How many of them must have a solution for a patch to count in full.
 const ROBUST: usize = 3;
-/// Space that the standing body keeps from the scan. \[m\]
+/// Cubes of which one point shows where the standing body may not be. \[m\]
+const OUTLINE: f64 = 0.04;
+/// Space that the standing body keeps from what is there. \[m\]
 const BODY_SPACE: f64 = 0.03;
 /// Half of the width of a body that is only known by its meshes. \[m\]
 const BODY_WIDTH: f64 = 0.08;
 
 /// Stances on a ring of candidates around the object, best first, at most
-/// `search.finalists`; empty where none reaches anything. Scan and patches in the floor frame.
+/// `search.finalists`; empty where none reaches anything. Scene and patches in the floor frame.
 ///
 /// # Errors
 /// Passes on a held joint's name that the robot does not have.
@@ -145,11 +148,11 @@ pub fn candidates(
     robot: &Robot,
     arm: &Arm,
     tool: &Tool,
-    scan: &Scan,
+    scene: &Scene,
     patches: &[Patch],
     search: &StanceSearch,
 ) -> Result<Vec<Candidate>, ArmError> {
-    let centre = centroid(&scan.points);
+    let centre = centroid(&scene.surface.points);
     let mut stances = Vec::new();
     let lift =
         search.lift.as_ref().filter(|(name, _)| arm.held_joints().iter().any(|h| &h.name == name));
@@ -172,7 +175,7 @@ pub fn candidates(
                     let base = [
                         centre.x + distance * bearing.cos() - pivot.x,
                         centre.y + distance * bearing.sin() - pivot.y,
-                        turn,
+                        wrap(turn),
                     ];
                     stances.push((
                         Stance { base, held: held.clone() },
@@ -185,8 +188,7 @@ pub fn candidates(
     }
     let judged = spread(patches, search.patches);
     let total: usize = judged.iter().map(|p| p.points.len()).sum();
-    let stride = scan.points.len().div_ceil(1500).max(1);
-    let sparse: Vec<Point3<f64>> = scan.points.iter().step_by(stride).copied().collect();
+    let sparse = scene.outline(OUTLINE);
     let values = redundancies(arm.ik().redundancy_range(), REDUNDANCIES);
     let mut found: Vec<Candidate> = stances
         .par_iter()

@@ -3,15 +3,15 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use nullsweep_planner::workcell::Scene;
-use nullsweep_surface::{CleanConfig, Placement, clean_region, place, simulate};
+use nullsweep_surface::{CleanConfig, Placement, place, simulate};
 
 /// The seat of the simulated chair, the rest of it in the way.
 pub(crate) fn seat() -> Scene {
     let view = simulate::chair(1);
     let (placed, _) = place(&view.scan, &Placement::SensorPose(view.sensor_pose));
-    clean_region(&placed, &simulate::chair_seat(), &CleanConfig::default())
+    Scene::seen(&placed, Some(&simulate::chair_seat()), &CleanConfig::default())
         .expect("the seat is there")
-        .into()
+        .0
 }
 
 /// Poses on a dome before the PR2: z into it, x upwards.

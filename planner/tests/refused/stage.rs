@@ -32,8 +32,8 @@ pub(crate) fn stage() -> &'static Stage {
     static STAGE: OnceLock<Stage> = OnceLock::new();
     STAGE.get_or_init(|| {
         let scene = crate::common::seat();
-        let held = vec![("torso_lift_joint".to_owned(), 0.1)];
-        let stance = Stance { base: [-0.04, 0.574, 5.607], held };
+        let held = vec![("torso_lift_joint".to_owned(), 0.2)];
+        let stance = Stance { base: [-0.708, -0.004, 1.047], held };
         let to_root = stance.pose().inverse();
         let job = Job {
             stance: StanceChoice::Given(stance),
@@ -46,7 +46,7 @@ pub(crate) fn stage() -> &'static Stage {
         let there = scene.transformed(&to_root);
         let (points, obstacles) = (there.points(), &there.obstacles);
         let world =
-            World::new(&robot, &made.arm, &job.tool, &points, obstacles, &job.collision).unwrap();
+            World::new(&robot, &made.arm, &job.tool, points, obstacles, &job.collision).unwrap();
         let cell = Workcell { arm: &made.arm, tool: &job.tool, world: &world };
         let mut bang = made.plan.clone();
         bang.knots.truncate(200);

@@ -1,0 +1,80 @@
+//! `planner verify`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nullsweep_planner::plan::Plan;
+use nullsweep_planner::progress::Progress;
+use nullsweep_planner::verify::{Given, verify};
+use nullsweep_planner::workcell::Scene;
+
+use crate::bars::Bars;
+use crate::exit::{OK, VIOLATIONS};
+use crate::json::write_json;
+use crate::plan::verified_rows;
+use crate::refusal::tell;
+use crate::robot::RobotArgs;
+use crate::scene::{Demo, SceneArgs, scene};
+
+#[derive(Debug, Args)]
+pub(super) struct VerifyArgs {
+    /// The plan file.
+    plan: PathBuf,
+    /// The scan files that it was made for, given as they were to `plan`; none: nothing but the floor
+    /// is there.
+    scans: Vec<PathBuf>,
+    /// It was made for a simulated scan.
+    #[arg(long, value_enum, conflicts_with = "scans")]
+    demo: Option<Demo>,
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// Seed of the simulated scan, or of the points laid on a mesh; without it the plan's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Where nothing is found wrong, write the plan here as verified, so that `publish` takes it.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the figures as JSON to a file, or `-`, instead of a table.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
+    let bars = Bars::new();
+    let plan = Plan::read(&args.plan)?;
+    let robot = args.robot.robot()?;
+    let scene = if args.demo.is_none() && args.scans.is_empty() {
+        Scene::empty()
+    } else {
+        let seed = args.seed.unwrap_or(plan.seed);
+        scene(&args.scene, args.demo, &args.scans, seed, &bars)?
+    };
+    let (arm, collision) = (args.robot.spec()?, args.robot.collision());
+    let given = Given { robot: &robot, arm: &arm, scene: &scene, collision: &collision };
+    bars.stage("verify", Some(plan.knots.len()));
+    let found = verify(&plan, given, &|| bars.tick());
+    bars.clear();
+    let found = found?;
+    match &args.json {
+        Some(path) => write_json(&found, path)?,
+        None => {
+            let mut table = Table::new();
+            table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+            table.add_rows(verified_rows(&found));
+            println!("{table}");
+        }
+    }
+    if !found.violations.is_empty() {
+        tell(&found.violations);
+        eprintln!("planner: the plan breaks {} rules", found.violations.len());
+        return Ok(VIOLATIONS);
+    }
+    if let Some(out) = &args.out {
+        plan.sealed().write(out)?;
+    }
+    Ok(OK)
+}

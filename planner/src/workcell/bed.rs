@@ -1,0 +1,237 @@
+//! What the pad lies on: the surface, and how far above it the pad has to stay so that nothing
+//! presses it in too deep.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use nullsweep_robot::Tool;
+use nullsweep_surface::{Grid, Patch, Surface, SurfacePoint};
+
+use super::contact::tangents;
+use super::scene::Scene;
+
+/// The pad is raised until this much is left of what it may be pressed. \[m\]
+const SPARE: f64 = 0.0005;
+/// Farthest that its centre is raised off the surface: a sponge still touches where it is pressed
+/// elsewhere. \[m\]
+const HIGHEST: f64 = 0.005;
+/// What rises higher over the pad's plane is no unevenness but another thing, which the pad has to
+/// keep away from. \[m\]
+const UNEVEN: f64 = 0.025;
+/// Tilts of the pad that are tried on a patch. \[rad\]
+const TILTS: [f64; 3] = [0.07, 0.14, 0.21];
+/// Directions of each.
+const TURNS: usize = 8;
+/// The pad is raised and let down no more steeply than this along its way.
+const STEEPEST: f64 = 0.25;
+
+/// The surface, and the points that press on a pad that lies on it; in one frame.
+pub struct Bed {
+    surface: Surface,
+    points: Vec<Point3<f64>>,
+    grid: Grid,
+    /// Radius of the disc around the pad's centre that is looked at: half its long side. \[m\]
+    radius: f64,
+    /// How deep a point may press. \[m\]
+    deepest: f64,
+    /// Cosine of the largest angle between the pad's axis and the normal under its centre.
+    facing: f64,
+}
+
+impl Bed {
+    /// Of a scene, for a tool.
+    #[must_use]
+    pub fn new(scene: &Scene, tool: &Tool) -> Self {
+        let Scene { surface, surroundings, raw, .. } = scene;
+        let points: Vec<Point3<f64>> =
+            surface.points.iter().chain(surroundings).chain(raw).copied().collect();
+        let deepest = (tool.press_max - SPARE).max(0.0) + tool.stand_off;
+        let (surface, radius) = (Surface::new(surface), 0.5 * tool.length.max(tool.width));
+        let grid = Grid::new(&points, radius);
+        Self { surface, points, grid, radius, deepest, facing: tool.reach_angle.cos() }
+    }
+
+    /// A surface into which the pad may be pressed as deep as it likes, in any direction.
+    #[must_use]
+    pub fn soft(surface: Surface) -> Self {
+        let (points, grid) = (Vec::new(), Grid::new(&[], 1.0));
+        Self { surface, points, grid, radius: 0.0, deepest: f64::INFINITY, facing: -1.0 }
+    }
+
+    /// The surface as it is.
+    #[must_use]
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// The patch as the pad comes to lie on it: where something presses it in too deep tilted so
+    /// that this is least, then raised. Where the pad would not sweep the point under its centre, as
+    /// that lies too aslant, that point's normal takes the place of the patch's.
+    #[must_use]
+    pub fn raised(&self, patch: Patch) -> Patch {
+        let own = self.surface.normal_near(&patch.centre).unwrap_or(patch.normal);
+        let faces = |normal: &UnitVector3<f64>| normal.dot(&own) >= self.facing;
+        let upright = if faces(&patch.normal) { patch.normal } else { own };
+        let over = |normal| self.over(&SurfacePoint { point: patch.centre, normal });
+        let mut best = (over(upright).max(0.0), upright);
+        if best.0 > 0.0 {
+            for normal in tilts(&upright).filter(faces) {
+                let over = over(normal).max(0.0);
+                if over < best.0 - 1e-4 {
+                    best = (over, normal);
+                }
+            }
+        }
+        let (over, normal) = best;
+        Patch { centre: patch.centre + normal.scale(over.min(HIGHEST)), normal, ..patch }
+    }
+
+    /// [`Surface::line`], raised between its ends. `None` too where the pad would not sweep the
+    /// point under its centre, as that lies too aslant.
+    #[must_use]
+    pub fn line(
+        &self,
+        a: &SurfacePoint,
+        b: &SurfacePoint,
+        step: f64,
+        wave: f64,
+    ) -> Option<Vec<SurfacePoint>> {
+        let mut line = self.surface.line(a, b, step, wave)?;
+        let last = line.len() - 1;
+        // The ends stand where they are asked to, and between them the line is as much off the
+        // surface as they are.
+        let off = |end: &SurfacePoint| {
+            let foot = self.surface.project(&end.point, &end.normal);
+            foot.map_or(0.0, |foot| (end.point - foot.point).dot(&end.normal).max(0.0))
+        };
+        let (from, to) = (off(a), off(b));
+        let mut lifts = vec![0.0; line.len()];
+        for (i, at) in line.iter().enumerate().take(last).skip(1) {
+            let share = i as f64 / last as f64;
+            lifts[i] = self.lift(at, from * (1.0 - share) + to * share);
+        }
+        if lifts.iter().any(|lift| *lift > 0.0) {
+            let steps: Vec<f64> =
+                line.windows(2).map(|w| STEEPEST * (w[1].point - w[0].point).norm()).collect();
+            for i in 1..last {
+                lifts[i] = lifts[i].max(lifts[i - 1] - steps[i - 1]);
+            }
+            for i in (1..last).rev() {
+                lifts[i] = lifts[i].max(lifts[i + 1] - steps[i]);
+            }
+            for (at, lift) in line.iter_mut().zip(&lifts) {
+                at.point += at.normal.scale(*lift);
+            }
+        }
+        self.faces_along(&line).then_some(line)
+    }
+
+    /// Whether the pad would sweep the points under its centre.
+    fn faces_along(&self, line: &[SurfacePoint]) -> bool {
+        let faces = |point: &Point3<f64>, axis: &Vector3<f64>| {
+            let own = self.surface.normal_near(point);
+            own.is_none_or(|own| axis.dot(&own) >= self.facing * axis.norm())
+        };
+        line.windows(2).all(|w| {
+            let middle = nalgebra::center(&w[0].point, &w[1].point);
+            let between = w[0].normal.into_inner() + w[1].normal.into_inner();
+            faces(&middle, &between) && faces(&w[1].point, &w[1].normal)
+        })
+    }
+
+    /// How far a pad with its centre here, already so far `off` the surface, has to be raised along
+    /// the normal. \[m\]
+    fn lift(&self, at: &SurfacePoint, off: f64) -> f64 {
+        self.over(at).clamp(0.0, (HIGHEST - off).max(0.0))
+    }
+
+    /// How much too deep a pad with its centre here is pressed in; negative: what is left. \[m\]
+    fn over(&self, at: &SurfacePoint) -> f64 {
+        let mut highest = 0.0_f64;
+        if !self.points.is_empty() {
+            let reach = self.radius.hypot(UNEVEN);
+            self.grid.within(&at.point, reach, |_, p, squared| {
+                let height = (p - at.point).dot(&at.normal);
+                let beside = squared - height * height;
+                if height <= UNEVEN && beside <= self.radius * self.radius {
+                    highest = highest.max(height);
+                }
+            });
+        }
+        highest - self.deepest
+    }
+}
+
+/// Directions about `normal`, the nearest to it first.
+fn tilts(normal: &UnitVector3<f64>) -> impl Iterator<Item = UnitVector3<f64>> {
+    let (e1, e2) = tangents(normal);
+    let normal = normal.into_inner();
+    TILTS.into_iter().flat_map(move |tilt| {
+        (0..TURNS).map(move |k| {
+            let turn = TAU * k as f64 / TURNS as f64;
+            let aside = e1 * turn.cos() + e2 * turn.sin();
+            UnitVector3::new_normalize(normal * tilt.cos() + aside * tilt.sin())
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nullsweep_surface::Scan;
+
+    use super::*;
+
+    /// A floor of 40 × 40 cm with a ridge of some height along y.
+    fn ridge(height: f64) -> Scene {
+        let at = |n: i32| 0.004 * f64::from(n) - 0.2;
+        let points: Vec<Point3<f64>> = (0..10_000)
+            .map(|i| {
+                let (x, y) = (at(i % 100), at(i / 100));
+                let over = (1.0 - (x / 0.03).powi(2)).max(0.0);
+                Point3::new(x, y, height * over)
+            })
+            .collect();
+        let up = UnitVector3::new_normalize(Vector3::z());
+        let normals = vec![up; points.len()];
+        Scene::on_floor(Scan { raw: points.clone(), points, normals, spacing: 0.004 })
+    }
+
+    fn flat(x: f64) -> SurfacePoint {
+        SurfacePoint {
+            point: Point3::new(x, 0.0, 0.0),
+            normal: UnitVector3::new_normalize(Vector3::z()),
+        }
+    }
+
+    #[test]
+    fn the_pad_is_raised_where_something_presses_it_in_too_deep() {
+        let tool = Tool::default();
+        let bed = Bed::new(&ridge(0.013), &tool);
+        // 13 mm press on a pad that gives way by 10.
+        assert!(
+            (bed.lift(&flat(0.04), 0.0) - 0.0035).abs() < 1e-4,
+            "{}",
+            bed.lift(&flat(0.04), 0.0)
+        );
+        assert_eq!(bed.lift(&flat(0.15), 0.0), 0.0);
+        let bed = Bed::new(&ridge(0.009), &tool);
+        assert_eq!(bed.lift(&flat(0.04), 0.0), 0.0);
+        // A wall is not lain on.
+        let bed = Bed::new(&ridge(0.2), &tool);
+        assert!(bed.lift(&flat(0.09), 0.0) <= HIGHEST);
+    }
+
+    #[test]
+    fn a_line_is_raised_gently_and_its_ends_stay() {
+        let tool = Tool::default();
+        let bed = Bed::new(&ridge(0.013), &tool);
+        let (a, b) = (flat(-0.15), flat(-0.035));
+        let line = bed.line(&a, &b, 0.006, 0.07).unwrap();
+        assert_eq!((line[0], line[line.len() - 1]), (a, b));
+        let lowered = bed.surface.line(&a, &b, 0.006, 0.07).unwrap();
+        let lifts: Vec<f64> =
+            line.iter().zip(&lowered).map(|(p, q)| (p.point - q.point).dot(&q.normal)).collect();
+        assert!(lifts.iter().any(|lift| *lift > 0.002), "{lifts:?}");
+        assert!(lifts.windows(2).take(lifts.len() - 2).all(|w| (w[1] - w[0]).abs() < 0.003));
+    }
+}
