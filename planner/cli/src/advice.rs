@@ -62,9 +62,13 @@ fn pipeline(error: &PipelineError) -> Option<String> {
             "--scale takes the file's unit to metres; else try a larger --patch-radius"
         }
         PipelineError::NoStance { .. } => {
-            "try another height with --torso, or say where the robot stands: --base x,y,yaw"
+            "try another height with --torso, or say where the robot stands: --base x,y,yaw; where \
+             unseen space is in the way, add a scan from another side, or take it for free with \
+             --unseen free"
         }
-        PipelineError::StanceHit { .. } => "choose another --base",
+        PipelineError::StanceHit { .. } => {
+            "choose another --base; space that no scan has seen counts as free with --unseen free"
+        }
         PipelineError::StartHit { .. }
         | PipelineError::StartLimit { .. }
         | PipelineError::NoMotion { .. } => "give another --start",

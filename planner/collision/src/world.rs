@@ -1,5 +1,7 @@
 //! A robot in its surroundings, prepared for fast collision checks.
 
+use std::sync::Arc;
+
 use nullsweep_robot::{Arm, JointVector, Robot, Tool};
 
 use crate::bodies::Bodies;
@@ -32,9 +34,9 @@ pub struct World {
     /// Pairs of moving shapes to check.
     pub(crate) pairs: Vec<(usize, usize)>,
     /// All points.
-    pub(crate) field: Field,
+    pub(crate) field: Arc<Field>,
     /// Those that press on the pad.
-    pub(crate) firm: Field,
+    pub(crate) firm: Arc<Field>,
     pub(crate) reach: Reach,
     pub(crate) margins: Margins,
     pub(crate) contact: Contact,
@@ -71,9 +73,11 @@ impl World {
         let contact = Contact::new(&bodies, tool, &margins);
         let Sorted { mut moving, fixed, mut pairs } = sort(&scene, &bodies, &contact);
         let reach = Reach::new(&bodies, arm, &moving);
-        let near =
-            |points: &[_]| Field::new(points, &reach.centre, reach.radius + margins.environment);
-        let (field, firm) = (near(&scene.points.points), near(scene.points.firm()));
+        let within = reach.radius + margins.environment;
+        let near = |points: &[_]| Arc::new(Field::new(points, &reach.centre, within));
+        let (all, firm) = (&scene.points.points, scene.points.firm());
+        let field = near(all);
+        let firm = if firm.len() == all.len() { Arc::clone(&field) } else { near(firm) };
         let ranges = never::ranges(arm, &reach.stroke);
         leave_out(&bodies, &ranges, &mut moving, &fixed, &mut pairs, &margins);
         let exact = Exact::over(arm.clone(), scene);

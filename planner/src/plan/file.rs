@@ -172,6 +172,26 @@ impl Plan {
         std::fs::write(path, text).map_err(file)
     }
 
+    /// The plan, said to be verified as it is.
+    #[must_use]
+    pub fn sealed(self) -> Self {
+        let seal = Some(self.seal_now());
+        Self { seal, ..self }
+    }
+
+    /// Whether it is as it was verified.
+    ///
+    /// # Errors
+    /// [`PlanError::Unverified`], or where it was changed: [`PlanError::KnotChanged`],
+    /// [`PlanError::Changed`].
+    pub fn check_seal(&self) -> Result<(), PlanError> {
+        self.seal.as_ref().ok_or(PlanError::Unverified)?.check(&self.seal_now())
+    }
+
+    fn seal_now(&self) -> Seal {
+        Seal::new(&self.knots, &Self { knots: Vec::new(), seal: None, ..self.clone() })
+    }
+
     /// The robot's root frame in the floor frame.
     #[must_use]
     pub fn base_pose(&self) -> Isometry3<f64> {

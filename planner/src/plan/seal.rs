@@ -1,10 +1,10 @@
-//! A plan as it was verified: what tells that it was changed since.
+//! Checksums of a plan as it was verified: what tells that it was changed since.
 
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::error::PlanError;
-use super::file::Plan;
+use super::knot::PlanKnot;
 
 /// Checksums of a plan that passed the last gate. They tell a change, an edit by hand say; they keep
 /// out nobody who means to deceive.
@@ -18,10 +18,22 @@ pub struct Seal {
 }
 
 impl Seal {
-    fn of(plan: &Plan) -> Self {
-        let knots = plan.knots.iter().map(checksum).collect();
-        let rest = Plan { knots: Vec::new(), seal: None, ..plan.clone() };
-        Self { knots, rest: checksum(&rest) }
+    /// Of a plan's knots, and of all else of it.
+    pub(super) fn new(knots: &[PlanKnot], rest: &impl Serialize) -> Self {
+        Self { knots: knots.iter().map(checksum).collect(), rest: checksum(rest) }
+    }
+
+    /// Whether what is found now is what was sealed.
+    ///
+    /// # Errors
+    /// [`PlanError::KnotChanged`] or [`PlanError::Changed`].
+    pub(super) fn check(&self, found: &Self) -> Result<(), PlanError> {
+        let knots = self.knots.len().max(found.knots.len());
+        let differs = |k: &usize| self.knots.get(*k) != found.knots.get(*k);
+        if let Some(knot) = (0..knots).find(differs) {
+            return Err(PlanError::KnotChanged { knot });
+        }
+        if self.rest == found.rest { Ok(()) } else { Err(PlanError::Changed) }
     }
 }
 
@@ -30,37 +42,12 @@ fn checksum<T: Serialize>(value: &T) -> u32 {
     xxh3_64(&serde_json::to_vec(value).unwrap_or_default()) as u32
 }
 
-impl Plan {
-    /// The plan, said to be verified as it is.
-    #[must_use]
-    pub fn sealed(self) -> Self {
-        let seal = Some(Seal::of(&self));
-        Self { seal, ..self }
-    }
-
-    /// Whether it is as it was verified.
-    ///
-    /// # Errors
-    /// [`PlanError::Unverified`], or where it was changed: [`PlanError::KnotChanged`],
-    /// [`PlanError::Changed`].
-    pub fn check_seal(&self) -> Result<(), PlanError> {
-        let sealed = self.seal.as_ref().ok_or(PlanError::Unverified)?;
-        let found = Seal::of(self);
-        let differs = |k: &usize| sealed.knots.get(*k) != found.knots.get(*k);
-        let knots = sealed.knots.len().max(found.knots.len());
-        if let Some(knot) = (0..knots).find(differs) {
-            return Err(PlanError::KnotChanged { knot });
-        }
-        if sealed.rest == found.rest { Ok(()) } else { Err(PlanError::Changed) }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nullsweep_robot::{ArmSpec, JointVector, Robot, Side, Tool};
 
     use super::*;
-    use crate::plan::PlanKnot;
+    use crate::plan::Plan;
 
     #[test]
     fn a_change_is_told_by_its_knot() {

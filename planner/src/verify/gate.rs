@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::collisions::{collisions, standing};
 use super::kinematics::kinematics;
+use super::percentile::percentile;
 use super::press::{Press, press};
 use super::violation::{Violation, ViolationKind};
 use crate::plan::{Plan, PlanError, Stretch};
@@ -225,9 +226,4 @@ fn distances(plan: &Plan, scan: &Scan, pads: &[Pad]) -> Vec<f64> {
         .collect();
     distances.sort_by(f64::total_cmp);
     distances
-}
-
-pub(super) fn percentile(sorted: &[f64], share: f64) -> f64 {
-    let last = sorted.len().saturating_sub(1);
-    sorted.get((share * last as f64).round() as usize).copied().unwrap_or(0.0)
 }

@@ -11,6 +11,7 @@
 mod collisions;
 mod gate;
 mod kinematics;
+mod percentile;
 mod press;
 mod violation;
 

@@ -7,7 +7,7 @@ use nullsweep_surface::Grid;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::gate::percentile;
+use super::percentile::percentile;
 use crate::workcell::Scene;
 
 /// Farthest before the pad's plane that a point may lie and be touched. \[m\]

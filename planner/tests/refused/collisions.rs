@@ -1,6 +1,6 @@
 //! Ways to collide.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::workcell::Scene;
@@ -76,8 +76,13 @@ fn low() -> Plan {
 #[test]
 fn what_only_comes_near_is_accepted() {
     let s = stage();
-    assert_eq!(judge(&over_there(&[]), &table()).violations, []);
-    assert_eq!(judge(&low(), &s.scene).violations, []);
+    // The way there and back to the start; what sweeps the seat may be in the table.
+    let way = |mut plan: Plan| {
+        plan.knots.truncate(7);
+        plan
+    };
+    assert_eq!(judge(&way(over_there(&[])), &table()).violations, []);
+    assert_eq!(judge(&way(low()), &s.scene).violations, []);
 }
 
 pub(crate) fn cases() -> Vec<Case> {
@@ -85,9 +90,14 @@ pub(crate) fn cases() -> Vec<Case> {
     let k = on_the_line(&s.bang);
     let into = pad(&s.bang.knots[k].q).rotation * Vector3::z() * 0.03;
     let pressed = spoilt(&s.bang, |knots| knots[k].q = moved(knots[k].q, into));
+    // The sponge gives way by 10 mm and no more; the fingers are 1 mm farther back.
+    let deep = pad(&s.bang.knots[k].q).rotation * Vector3::z() * 0.0115;
+    let deep = spoilt(&s.bang, |knots| knots[k].q = moved(knots[k].q, deep));
     let jump = longest_transfer(&s.bang);
     let middle = s.bang.curve(jump).at(0.5);
     let post = scene_with("post", Vector3::repeat(0.01), pad_centre(&middle));
+    let mut hidden = s.scene.clone();
+    hidden.unseen = vec![s.bang.base_pose() * Point3::from(pad_centre(&middle))];
     let (dragged, from) = dragged(&s.bang);
     let elbow = over_there(&[("r_shoulder_lift_joint", 0.3)]);
     // Across the chest, the hand into the other shoulder.
@@ -108,6 +118,7 @@ pub(crate) fn cases() -> Vec<Case> {
     let case = Case::new;
     vec![
         case("the hand in the seat", retimed(pressed), k, "scan point"),
+        case("the sponge pressed too deep", retimed(deep), k, "scan point"),
         Case { scene: Some(table()), ..case("the elbow in a table", elbow, 3, "obstacle table") },
         Case { scene: Some(higher), ..case("a floor 10 cm higher", low(), 3, "obstacle floor") },
         case("the hand in the body", across, 2, "l_shoulder_pan_link"),
@@ -121,6 +132,10 @@ pub(crate) fn cases() -> Vec<Case> {
         Case {
             scene: Some(post),
             ..case("a post in the way", s.bang.clone(), jump, "obstacle post")
+        },
+        Case {
+            scene: Some(hidden),
+            ..case("the hand where nobody has looked", s.bang.clone(), jump, "unseen space")
         },
     ]
 }

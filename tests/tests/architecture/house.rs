@@ -107,12 +107,12 @@ const PLANNER: &[(&str, &[&str])] = &[
 
 #[rustfmt::skip]
 const COLLISION: &[&str] = &[
-    "frame", "rules", "mesh", "srdf", "error", "options", "obstacle",
+    "frame", "rules", "points", "tree", "mesh", "srdf", "error", "options", "obstacle",
     "solid", "spheres", "sieve", "field", "bodies", "parts", "shapes", "pairs", "scene", "exact",
     "fixed", "moving", "motion", "never", "world", "check", "proof",
 ];
 
-const SURFACE: &[&str] = &["grid", "fit", "scan", "simulate", "sheet", "patches"];
+const SURFACE: &[&str] = &["grid", "fit", "scan", "simulate", "sheet", "patches", "unseen"];
 
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[
