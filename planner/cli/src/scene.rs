@@ -133,6 +133,13 @@ fn read_scans(
             (None, Some(frame)) => frame.clone(),
             (None, None) => upright(args)?,
         };
+        let below = scan::below_support(&raw, &placement);
+        if below > 0 {
+            let path = path.display();
+            bars.note(&format!(
+                "{path}: {below} points alone below all others: nothing rests on them"
+            ));
+        }
         let (placed, pose) = scan::place(&raw, &placement);
         let sensor = placed.views[0].sensor;
         shared.get_or_insert(Placement::Frame { pose, sensor });

@@ -11,25 +11,34 @@
 
 mod clean;
 mod cloud;
+mod columns;
 mod crop;
+mod decode;
 mod error;
 mod mesh;
 mod normals;
 mod parsed;
 mod pcd;
+mod pieces;
 mod place;
 mod ply;
+mod ply_text;
 mod raw;
 mod read;
 mod region;
+mod rows;
 mod sample;
+mod stray;
 mod text;
+mod warning;
+mod winding;
 
 pub use clean::{CleanConfig, CleanReport, clean};
 pub use cloud::Scan;
 pub use crop::CropBox;
-pub use error::{Place, ScanError, ScanWarning};
-pub use place::{PlacedScan, Placement, View, place};
+pub use error::{Place, ScanError};
+pub use place::{PlacedScan, Placement, View, below_support, place};
 pub use raw::RawScan;
 pub use read::{Format, ReadOptions, read, read_bytes};
 pub use region::{Region, clean_region};
+pub use warning::{Rest, ScanWarning};
