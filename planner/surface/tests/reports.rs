@@ -220,6 +220,25 @@ fn headers_and_lines_that_others_write_are_read() {
     assert!(read([ply.as_slice(), lost.as_bytes()].concat(), "a.ply").is_err());
 }
 
+#[test]
+fn a_format_that_is_not_read_is_named_with_the_way_to_one_that_is() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, begins, format, command) in [
+        ("a.las", "", "LAS/LAZ", "pdal translate"),
+        ("b.E57", "", "E57", "pdal translate"),
+        ("c", "glTF", "glTF", "assimp export"),
+        ("d.3mf", "PK", "3MF", "assimp export"),
+        ("e.npy", "", "NumPy", "n.savetxt('out.xyz'"),
+        ("f.ptx", "2\n2\n", "PTX", "CloudCompare"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, begins).unwrap();
+        let error = scan::read(&path, &ReadOptions::default()).unwrap_err().to_string();
+        assert!(error.contains(&format!("{format} files are not read")), "{error}");
+        assert!(error.contains(command) && error.contains(&path.display().to_string()), "{error}");
+    }
+}
+
 /// The folder of reports, or `None` with the reason printed.
 fn reports() -> Option<PathBuf> {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/reports"));

@@ -24,6 +24,16 @@ pub enum ScanError {
         /// The file.
         path: PathBuf,
     },
+    /// The file is of a format that is known but not read.
+    #[error("{}: {format} files are not read; convert it: `{convert}`", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: &'static str,
+        /// A command that makes a file of it that is read.
+        convert: String,
+    },
     /// The file breaks its own format.
     #[error("{}: {place}: {cause}", path.display())]
     Malformed {

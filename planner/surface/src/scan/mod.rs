@@ -15,6 +15,7 @@ mod columns;
 mod crop;
 mod decode;
 mod error;
+mod foreign;
 mod mesh;
 mod normals;
 mod parsed;

@@ -9,7 +9,7 @@ use super::error::{Malformed, ScanError};
 use super::parsed::Parsed;
 use super::raw::RawScan;
 use super::warning::ScanWarning;
-use super::{decode, mesh, pcd, ply, sample, stray, text, winding};
+use super::{decode, foreign, mesh, pcd, ply, sample, stray, text, winding};
 
 /// How to read a scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,8 +78,12 @@ const METRE_EXTENT: f64 = 30.0;
 pub fn read(path: &Path, options: &ReadOptions) -> Result<RawScan, ScanError> {
     let bytes =
         std::fs::read(path).map_err(|source| ScanError::Io { path: path.into(), source })?;
-    let format = Format::detect(path, &bytes)
-        .ok_or_else(|| ScanError::UnknownFormat { path: path.into() })?;
+    let Some(format) = Format::detect(path, &bytes) else {
+        return Err(match foreign::detect(path, &bytes) {
+            Some((format, convert)) => ScanError::Foreign { path: path.into(), format, convert },
+            None => ScanError::UnknownFormat { path: path.into() },
+        });
+    };
     read_bytes(&bytes, format, path, options)
 }
 

@@ -167,7 +167,7 @@ impl Cells {
                     cell.matches(',').count() <= 1
                         && !cell.starts_with(',')
                         && !cell.ends_with(',')
-                        && !(cell.contains(',') && cell.contains('.'))
+                        && (!cell.contains(',') || !cell.contains('.'))
                         && number(&cell.replace(',', ".")).is_some()
                 })
         });

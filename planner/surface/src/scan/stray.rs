@@ -77,7 +77,7 @@ pub(super) fn support(points: &[Point3<f64>], upright: &UnitQuaternion<f64>) -> 
     let count = points.len();
     let side = (size / 50.0).max(1.5 * size / (count as f64).sqrt());
     let cells: HashMap<[i64; 3], usize> = counts(points.iter().copied(), side);
-    let enough = (count / 1000).max(4).min(MIN_POINTS);
+    let enough = (count / 1000).clamp(4, MIN_POINTS);
     let alone = |p: &Point3<f64>| {
         let near = around(cell(p, side)).filter_map(|key| cells.get(&key)).sum::<usize>();
         near < enough
