@@ -15,7 +15,9 @@ mod publish;
 mod refusal;
 mod replan;
 mod robot;
+mod room;
 mod scene;
+mod scene_command;
 mod task;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
@@ -43,6 +45,8 @@ struct Cli {
 enum Command {
     /// Make a plan from scans, or from a simulated scan.
     Plan(Box<plan::PlanArgs>),
+    /// Show what is in a scanned scene: its planes, and its objects by number.
+    Scene(Box<scene_command::SceneCommandArgs>),
     /// Make a plan through given tool poses.
     Task(Box<task::TaskArgs>),
     /// Send a plan to the executor.
@@ -70,6 +74,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let result = match cli.command {
         Command::Plan(args) => plan::run(&args),
+        Command::Scene(args) => scene_command::run(&args),
         Command::Task(args) => task::run(&args),
         Command::Publish(args) => publish::run(&args),
         Command::Replan(args) => replan::run(&args),

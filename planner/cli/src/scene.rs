@@ -11,11 +11,12 @@ use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_robot::Geometry;
 use nullsweep_surface::{
-    CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan, scan, simulate,
+    CleanConfig, CropBox, PlacedScan, Placement, RawScan, ReadOptions, Scan, scan, simulate,
 };
 
 use crate::advice;
 use crate::bars::Bars;
+use crate::room;
 
 /// How the scans stand and what of them is swept.
 #[derive(Debug, Args)]
@@ -39,6 +40,33 @@ pub(super) struct SceneArgs {
     /// xmin,ymin,zmin,xmax,ymax,zmax.
     #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
     crop: Option<CropBox>,
+    /// Sweep only this object of the scene, by its number from `planner scene`, or the one with the
+    /// most points: N or `largest`. Without --up, --sensor-pose: gravity is found by the largest level
+    /// plane.
+    #[arg(long, value_name = "OBJECT", conflicts_with = "crop")]
+    object: Option<ObjectChoice>,
+}
+
+/// Which object of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ObjectChoice {
+    /// The one with the most points.
+    Largest,
+    /// By its number, from 1 on.
+    Number(usize),
+}
+
+impl FromStr for ObjectChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            Ok(0) => Err("objects are numbered from 1 on".into()),
+            Ok(number) => Ok(Self::Number(number)),
+            Err(_) if text == "largest" => Ok(Self::Largest),
+            Err(_) => Err("a number or `largest` is wanted".into()),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -81,9 +109,14 @@ pub(super) fn scene(
     seed: u64,
     bars: &Bars,
 ) -> anyhow::Result<Scene> {
+    if let Some(choice) = args.object {
+        ensure!(demo.is_none(), "--object chooses from a scan, not from a demo");
+        let placed = read_scans(args, scans, seed, Gravity::Found, bars)?;
+        return room::object(&placed, choice, seed, bars);
+    }
     let (placed, region) = match demo {
         Some(demo) => simulated(demo, seed),
-        None => (read_scans(args, scans, seed, bars)?, None),
+        None => (read_scans(args, scans, seed, Gravity::Given, bars)?, None),
     };
     let region = args.crop.or(region);
     let config = CleanConfig::default();
@@ -106,10 +139,21 @@ fn simulated(demo: Demo, seed: u64) -> (PlacedScan, Option<CropBox>) {
     (scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose)).0, region)
 }
 
-fn read_scans(
+/// Who says which way is up and how high the sensor is, where arguments leave it open.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Gravity {
+    /// Up is z, and the lowest point rests on the support.
+    Given,
+    /// The largest level plane of the first scan.
+    Found,
+}
+
+/// Reads, places and joins the scans, with a note for all that had to be guessed.
+pub(super) fn read_scans(
     args: &SceneArgs,
     scans: &[PathBuf],
     seed: u64,
+    gravity: Gravity,
     bars: &Bars,
 ) -> anyhow::Result<PlacedScan> {
     ensure!(
@@ -131,6 +175,9 @@ fn read_scans(
             (Some(pose), _) => Placement::SensorPose(isometry(pose)?),
             // Further scans without a pose of their own share the first one's frame.
             (None, Some(frame)) => frame.clone(),
+            (None, None) if gravity == Gravity::Found && args.sensor_height.is_none() => {
+                leveled(args, &raw, seed, bars)?
+            }
             (None, None) => upright(args)?,
         };
         let below = scan::below_support(&raw, &placement);
@@ -148,12 +195,36 @@ fn read_scans(
     Ok(joined)
 }
 
-fn upright(args: &SceneArgs) -> anyhow::Result<Placement> {
-    let up = match args.up {
-        None => Vector3::z_axis(),
-        Some(Numbers(v)) => UnitVector3::try_new(Vector3::from(v), 1e-6)
-            .context("--up must not be the zero vector")?,
+/// The direction that `--up` gives.
+fn up(args: &SceneArgs) -> anyhow::Result<Option<UnitVector3<f64>>> {
+    let unit = |Numbers(v): Numbers<3>| {
+        UnitVector3::try_new(Vector3::from(v), 1e-6).context("--up must not be the zero vector")
     };
+    args.up.map(unit).transpose()
+}
+
+/// The placement by the largest level plane of a scan.
+fn leveled(args: &SceneArgs, raw: &RawScan, seed: u64, bars: &Bars) -> anyhow::Result<Placement> {
+    let level = room::level(raw, up(args)?, seed)?;
+    let [x, y, z] = level.up.into_inner().into();
+    bars.note(&format!(
+        "up is {x:.4},{y:.4},{z:.4} and the file's origin {:.3} m above what things stand on, by a \
+         level plane of which {:.2} m² are seen",
+        level.height, level.area
+    ));
+    let support_height = args.support_height;
+    let placement =
+        Placement::UpAndHeight { up: level.up, sensor_height: level.height, support_height };
+    if level.camera {
+        return Ok(placement);
+    }
+    bars.note("the file's origin is no camera: which side of a surface is outside is voted for");
+    let (_, pose) = scan::place(raw, &placement);
+    Ok(Placement::Frame { pose, sensor: None })
+}
+
+fn upright(args: &SceneArgs) -> anyhow::Result<Placement> {
+    let up = up(args)?.unwrap_or(Vector3::z_axis());
     Ok(match args.sensor_height {
         Some(sensor_height) => {
             Placement::UpAndHeight { up, sensor_height, support_height: args.support_height }
@@ -171,7 +242,7 @@ fn isometry(&Numbers([x, y, z, qx, qy, qz, qw]): &Numbers<7>) -> anyhow::Result<
 /// How far a table top reaches beyond the object. [m]
 const TABLE_RIM: f64 = 0.10;
 /// Thickness of a table top. [m]
-const TABLE_TOP: f64 = 0.03;
+pub(super) const TABLE_TOP: f64 = 0.03;
 
 /// A table top under the scan.
 fn table_under(scan: &Scan, height: f64) -> Obstacle {

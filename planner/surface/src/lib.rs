@@ -39,6 +39,8 @@ mod grid;
 
 pub mod scan;
 
+pub mod room;
+
 pub mod patches;
 mod sheet;
 pub mod simulate;

@@ -41,5 +41,5 @@ pub use error::{Place, ScanError};
 pub use place::{PlacedScan, Placement, View, below_support, place};
 pub use raw::RawScan;
 pub use read::{Format, ReadOptions, read, read_bytes};
-pub use region::{Region, clean_region};
+pub use region::{Region, clean_apart, clean_region};
 pub use warning::{Rest, ScanWarning};

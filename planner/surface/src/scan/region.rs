@@ -55,15 +55,32 @@ pub fn clean_region(
     Ok(Region { surface, surroundings: surroundings(scan, region), report })
 }
 
+/// Cleans the views of one object and thins those of all else that is in the way.
+///
+/// # Errors
+/// As [`clean()`].
+pub fn clean_apart(
+    object: &PlacedScan,
+    rest: &[Point3<f64>],
+    config: &CleanConfig,
+) -> Result<Region, ScanError> {
+    let (surface, report) = clean(object, config)?;
+    Ok(Region { surface, surroundings: thinned(rest.iter()), report })
+}
+
 fn surroundings(scan: &PlacedScan, region: &CropBox) -> Vec<Point3<f64>> {
+    let points = scan.views.iter().flat_map(|view| &view.points);
+    thinned(points.filter(|point| !region.contains(point)))
+}
+
+/// The means of the points in each cube, where there are enough.
+fn thinned<'a>(points: impl Iterator<Item = &'a Point3<f64>>) -> Vec<Point3<f64>> {
     let mut cells: BTreeMap<[i64; 3], (Vector3<f64>, usize)> = BTreeMap::new();
-    for point in scan.views.iter().flat_map(|view| &view.points) {
-        if !region.contains(point) {
-            let key = [0, 1, 2].map(|axis| (point[axis] / SURROUNDINGS_VOXEL).floor() as i64);
-            let cell = cells.entry(key).or_insert((Vector3::zeros(), 0));
-            cell.0 += point.coords;
-            cell.1 += 1;
-        }
+    for point in points {
+        let key = [0, 1, 2].map(|axis| (point[axis] / SURROUNDINGS_VOXEL).floor() as i64);
+        let cell = cells.entry(key).or_insert((Vector3::zeros(), 0));
+        cell.0 += point.coords;
+        cell.1 += 1;
     }
     cells
         .into_values()
