@@ -19,6 +19,7 @@ mod room;
 mod scene;
 mod scene_command;
 mod task;
+mod views;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
 pub use exit::{FAILED, LOST, OK, USAGE, VIOLATIONS};

@@ -1,6 +1,6 @@
 //! What stands in a scanned room, and one object of it as the surface to sweep.
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use nalgebra::{Point3, Translation3, UnitVector3, Vector3};
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
@@ -21,10 +21,7 @@ pub(super) fn level(
     up: Option<UnitVector3<f64>>,
     seed: u64,
 ) -> anyhow::Result<Level> {
-    let found = room::level(raw, up, seed).context(
-        "say with --up X,Y,Z (against gravity, in the file's frame) and --sensor-height M, or with \
-         --sensor-pose, how the scan stands",
-    )?;
+    let found = room::level(raw, up, seed)?;
     // Who says the direction says it exactly; the plane gives the height.
     Ok(Level { up: up.unwrap_or(found.up), ..found })
 }

@@ -17,6 +17,7 @@ use nullsweep_surface::{
 use crate::advice;
 use crate::bars::Bars;
 use crate::room;
+use crate::views;
 
 /// How the scans stand and what of them is swept.
 #[derive(Debug, Args)]
@@ -27,6 +28,9 @@ pub(super) struct SceneArgs {
     /// Direction against gravity in the scans' frame: x,y,z.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with = "sensor_pose")]
     up: Option<Numbers<3>>,
+    /// Take several scans as they are placed, without laying each onto those before it.
+    #[arg(long)]
+    as_placed: bool,
     /// Height of the sensor above what the object stands on. [m]
     #[arg(long, value_name = "M", requires = "up")]
     sensor_height: Option<f64>,
@@ -163,36 +167,65 @@ pub(super) fn read_scans(
         args.sensor_pose.len()
     );
     let options = ReadOptions { scale: args.scale, seed, ..ReadOptions::default() };
-    let mut joined = PlacedScan::default();
-    let mut shared: Option<Placement> = None;
-    for (i, path) in scans.iter().enumerate() {
+    let mut files = Vec::with_capacity(scans.len());
+    for path in scans {
         let raw = scan::read(path, &options)?;
         for warning in &raw.warnings {
             let advice = advice::on_warning(warning).map(|advice| format!(" ({advice})"));
             bars.note(&format!("{}: {warning}{}", path.display(), advice.unwrap_or_default()));
         }
+        files.push((path, raw));
+    }
+    let mut shared = None;
+    if args.sensor_pose.is_empty() {
+        // All files share the frame of the first one.
+        shared = Some(together(args, &files, seed, gravity, bars)?);
+    }
+    let mut joined = PlacedScan::default();
+    for (i, (path, raw)) in files.into_iter().enumerate() {
         let placement = match (args.sensor_pose.get(i), &shared) {
             (Some(pose), _) => Placement::SensorPose(isometry(pose)?),
-            // Further scans without a pose of their own share the first one's frame.
-            (None, Some(frame)) => frame.clone(),
-            (None, None) if gravity == Gravity::Found && args.sensor_height.is_none() => {
-                leveled(args, &raw, seed, bars)?
-            }
+            (None, Some(shared)) => shared.clone(),
             (None, None) => upright(args)?,
         };
-        let below = scan::below_support(&raw, &placement);
-        if below > 0 {
-            let path = path.display();
-            bars.note(&format!(
-                "{path}: {below} points alone below all others: nothing rests on them"
-            ));
+        let (mut placed, _) = scan::place(&raw, &placement);
+        // A file with normals is a model or has been through a program that laid it in place.
+        if i > 0 && !args.as_placed && raw.normals.is_none() {
+            views::lay(&joined, &mut placed, path, bars)?;
         }
-        let (placed, pose) = scan::place(&raw, &placement);
-        let sensor = placed.views[0].sensor;
-        shared.get_or_insert(Placement::Frame { pose, sensor });
         joined.join(placed);
     }
     Ok(joined)
+}
+
+/// The one placement of files that share a frame.
+fn together(
+    args: &SceneArgs,
+    files: &[(&PathBuf, RawScan)],
+    seed: u64,
+    gravity: Gravity,
+    bars: &Bars,
+) -> anyhow::Result<Placement> {
+    let Some((path, first)) = files.first() else { return upright(args) };
+    let placement = match gravity {
+        Gravity::Found if args.sensor_height.is_none() => leveled(args, first, seed, bars)?,
+        _ => upright(args)?,
+    };
+    // What is lowest of all files rests on the support.
+    let whole = match placement {
+        Placement::Up { .. } if files.len() > 1 => {
+            let points = files.iter().flat_map(|(_, raw)| raw.points.iter().copied()).collect();
+            &RawScan { points, normals: None, ..first.clone() }
+        }
+        _ => first,
+    };
+    let below = scan::below_support(whole, &placement);
+    if below > 0 {
+        let path = path.display();
+        bars.note(&format!("{path}: {below} points alone below all others: nothing rests on them"));
+    }
+    let (placed, pose) = scan::place(whole, &placement);
+    Ok(Placement::Frame { pose, sensor: placed.views[0].sensor })
 }
 
 /// The direction that `--up` gives.

@@ -39,6 +39,7 @@ mod grid;
 
 pub mod scan;
 
+pub mod register;
 pub mod room;
 
 pub mod patches;

@@ -1,6 +1,7 @@
 //! What stands in a room.
 
-use std::collections::{BTreeMap, HashMap};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, HashSet};
 
 use nalgebra::{Point3, Vector3};
 
@@ -30,6 +31,13 @@ const POINTS: usize = 150;
 /// How far above a plane the lowest point of what stands on it may be: the feet of things are hidden,
 /// or go with the plane. \[m\]
 const FOOT: f64 = 0.12;
+/// How far above a plane the lowest seen part of what stands on it may be, the rest hidden. \[m\]
+const HIDDEN: f64 = 0.5;
+/// How far the foot of an object may reach beyond what stands on it. \[m\]
+const ASIDE: f64 = 0.08;
+/// Points this many tolerances off a plane are still of it: what is left would tie together all that
+/// stands on it.
+const BAND: f64 = 1.5;
 
 impl Segment {
     /// The object's own views, and those of all else.
@@ -56,7 +64,7 @@ impl Segment {
 pub(super) fn find(scan: &PlacedScan, planes: &[Plane], noise: &Noise) -> Vec<Segment> {
     let floor = planes.iter().find(|plane| plane.kind == PlaneKind::Floor);
     let free = |p: &Point3<f64>| {
-        let tolerance = noise.at(p);
+        let tolerance = BAND * noise.at(p);
         let under = |floor: &Plane| (p - floor.point).dot(&floor.normal) < tolerance;
         !floor.is_some_and(under) && !planes.iter().any(|plane| plane.holds(p, tolerance))
     };
@@ -69,65 +77,122 @@ pub(super) fn find(scan: &PlacedScan, planes: &[Plane], noise: &Noise) -> Vec<Se
     }
     // A single pixel bridges nothing.
     cells.retain(|_, members| members.len() > 1);
-    let mut part: HashMap<[i64; 3], usize> = HashMap::new();
-    let mut segments = Vec::new();
+    let mut seen: HashSet<[i64; 3]> = HashSet::new();
+    let mut clusters = Vec::new();
     for &start in cells.keys() {
-        if part.contains_key(&start) {
+        if !seen.insert(start) {
             continue;
         }
-        part.insert(start, segments.len());
-        let mut cluster = vec![start];
+        let mut keys = vec![start];
         let mut next = 0;
-        while let Some(&[x, y, z]) = cluster.get(next) {
+        while let Some(&[x, y, z]) = keys.get(next) {
             next += 1;
             for i in 0..27 {
                 let near = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
-                if cells.contains_key(&near) && !part.contains_key(&near) {
-                    part.insert(near, segments.len());
-                    cluster.push(near);
+                if cells.contains_key(&near) && seen.insert(near) {
+                    keys.push(near);
                 }
             }
         }
-        let members = cluster.iter().flat_map(|key| cells[key].iter().copied());
-        segments.extend(segment(scan, planes, members.collect()));
+        let points: Vec<_> = keys.iter().flat_map(|key| cells[key].iter().copied()).collect();
+        if points.len() >= POINTS {
+            clusters.push(Cluster::of(points, scan));
+        }
     }
-    segments.sort_by_key(|segment| std::cmp::Reverse(segment.points));
+    let mut segments: Vec<Segment> =
+        joined(clusters, scan, planes).iter().filter_map(|c| c.segment(scan, planes)).collect();
+    segments.sort_by_key(|segment| Reverse(segment.points));
     segments
 }
 
-/// The object of some points, if they are enough and stand on something.
-fn segment(scan: &PlacedScan, planes: &[Plane], points: Vec<(usize, u32)>) -> Option<Segment> {
-    if points.len() < POINTS {
-        return None;
+/// Points that hang together.
+struct Cluster {
+    /// View and index there.
+    points: Vec<(usize, u32)>,
+    min: Vector3<f64>,
+    max: Vector3<f64>,
+    centre: Point3<f64>,
+    /// Height of its lowest hundredth. \[m\]
+    foot: f64,
+}
+
+impl Cluster {
+    fn of(points: Vec<(usize, u32)>, scan: &PlacedScan) -> Self {
+        let infinite = Vector3::repeat(f64::INFINITY);
+        let (mut min, mut max, mut sum) = (infinite, -infinite, Vector3::zeros());
+        let mut heights = Vec::with_capacity(points.len());
+        for &(v, i) in &points {
+            let p = scan.views[v].points[i as usize].coords;
+            (min, max) = (min.inf(&p), max.sup(&p));
+            sum += p;
+            heights.push(p.z);
+        }
+        heights.sort_unstable_by(f64::total_cmp);
+        let foot = heights[points.len() / 100];
+        Self { centre: Point3::from(sum / points.len() as f64), points, min, max, foot }
     }
-    let mut members = vec![Vec::new(); scan.views.len()];
-    let infinite = Vector3::repeat(f64::INFINITY);
-    let (mut min, mut max, mut sum) = (infinite, -infinite, Vector3::zeros());
-    let count = points.len();
-    let mut heights = Vec::with_capacity(count);
-    for (v, i) in points {
-        let p = scan.views[v].points[i as usize].coords;
-        (min, max) = (min.inf(&p), max.sup(&p));
-        sum += p;
-        heights.push(p.z);
-        members[v].push(i);
-    }
-    members.iter_mut().for_each(|of| of.sort_unstable());
-    let centre = Point3::from(sum / count as f64);
-    heights.sort_by(f64::total_cmp);
-    let foot = heights[count / 100];
-    let carries = |plane: &Plane| {
-        let on_top = match plane.kind {
+
+    /// The plane under it, and how far.
+    fn support(&self, planes: &[Plane]) -> Option<(usize, f64)> {
+        let carries = |plane: &Plane| match plane.kind {
             PlaneKind::Floor => true,
             PlaneKind::Table => {
-                let outline = &plane.outline;
-                super::outline::contains(outline, &plane.normal, &centre, 0.02)
+                super::outline::contains(&plane.outline, &plane.normal, &self.centre, 0.02)
             }
             PlaneKind::Wall => false,
         };
-        on_top && (foot - plane.point.z).abs() < FOOT
-    };
-    let stands_on = planes.iter().position(carries)?;
-    let bounds = CropBox { min: min.into(), max: max.into() };
-    Some(Segment { members, points: count, bounds, centre, stands_on })
+        let under = planes.iter().enumerate().filter(|(_, plane)| carries(plane));
+        under
+            .map(|(i, plane)| (i, self.foot - plane.point.z))
+            .filter(|(_, gap)| *gap > -FOOT)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Whether another one lies below it, inside its own width: a foot whose column is hidden.
+    fn is_over(&self, other: &Self) -> bool {
+        let inside = |axis: usize| {
+            self.min[axis] - ASIDE < other.centre[axis]
+                && other.centre[axis] < self.max[axis] + ASIDE
+        };
+        let wide = |c: &Self| (c.max.xy() - c.min.xy()).norm();
+        other.max.z < self.foot + ASIDE
+            && inside(0)
+            && inside(1)
+            && wide(other) < 1.5 * wide(self)
+            && other.points.len() < self.points.len()
+    }
+
+    /// The object, if it stands on something.
+    fn segment(&self, scan: &PlacedScan, planes: &[Plane]) -> Option<Segment> {
+        let (stands_on, _) = self.support(planes).filter(|(_, gap)| *gap < HIDDEN)?;
+        let mut members = vec![Vec::new(); scan.views.len()];
+        for &(v, i) in &self.points {
+            members[v].push(i);
+        }
+        members.iter_mut().for_each(|of| of.sort_unstable());
+        let bounds = CropBox { min: self.min.into(), max: self.max.into() };
+        Some(Segment { members, points: self.points.len(), bounds, centre: self.centre, stands_on })
+    }
+}
+
+/// Clusters that hang in the air with what is below them.
+fn joined(mut clusters: Vec<Cluster>, scan: &PlacedScan, planes: &[Plane]) -> Vec<Cluster> {
+    clusters.sort_by_key(|cluster| Reverse(cluster.points.len()));
+    let mut whole: Vec<Cluster> = Vec::new();
+    while !clusters.is_empty() {
+        let mut cluster = clusters.remove(0);
+        let gap = cluster.support(planes).map(|(_, gap)| gap);
+        if gap.is_some_and(|gap| (FOOT..HIDDEN).contains(&gap)) {
+            let (below, rest): (Vec<_>, Vec<_>) =
+                clusters.into_iter().partition(|other| cluster.is_over(other));
+            clusters = rest;
+            if !below.is_empty() {
+                let mut points = cluster.points;
+                points.extend(below.into_iter().flat_map(|other| other.points));
+                cluster = Cluster::of(points, scan);
+            }
+        }
+        whole.push(cluster);
+    }
+    whole
 }
