@@ -1,5 +1,7 @@
 //! What stands in a scanned room, and one object of it as the surface to sweep.
 
+use std::str::FromStr;
+
 use anyhow::bail;
 use nalgebra::{Point3, Translation3, UnitVector3, Vector3};
 use nullsweep_collision::Obstacle;
@@ -10,10 +12,34 @@ use nullsweep_surface::room::{self, Level, Plane, PlaneKind, Room};
 use nullsweep_surface::{CleanConfig, PlacedScan, RawScan, scan};
 
 use crate::bars::Bars;
-use crate::scene::{ObjectChoice, TABLE_TOP};
+
+/// Thickness of a table top. [m]
+pub(super) const TABLE_TOP: f64 = 0.03;
 
 /// A level plane this near to height 0 is the floor that every scene has. [m]
 const FLOOR: f64 = 0.08;
+
+/// Which object of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ObjectChoice {
+    /// The one with the most points.
+    Largest,
+    /// By its number, from 1 on.
+    Number(usize),
+}
+
+impl FromStr for ObjectChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            Ok(0) => Err("objects are numbered from 1 on".into()),
+            Ok(number) => Ok(Self::Number(number)),
+            Err(_) if text == "largest" => Ok(Self::Largest),
+            Err(_) => Err("a number or `largest` is wanted".into()),
+        }
+    }
+}
 
 /// Gravity by a scan's largest level plane.
 pub(super) fn level(

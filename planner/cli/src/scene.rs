@@ -16,7 +16,7 @@ use nullsweep_surface::{
 
 use crate::advice;
 use crate::bars::Bars;
-use crate::room;
+use crate::room::{self, ObjectChoice, TABLE_TOP};
 use crate::views;
 
 /// How the scans stand and what of them is swept.
@@ -49,28 +49,6 @@ pub(super) struct SceneArgs {
     /// plane.
     #[arg(long, value_name = "OBJECT", conflicts_with = "crop")]
     object: Option<ObjectChoice>,
-}
-
-/// Which object of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ObjectChoice {
-    /// The one with the most points.
-    Largest,
-    /// By its number, from 1 on.
-    Number(usize),
-}
-
-impl FromStr for ObjectChoice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.parse() {
-            Ok(0) => Err("objects are numbered from 1 on".into()),
-            Ok(number) => Ok(Self::Number(number)),
-            Err(_) if text == "largest" => Ok(Self::Largest),
-            Err(_) => Err("a number or `largest` is wanted".into()),
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -274,8 +252,6 @@ fn isometry(&Numbers([x, y, z, qx, qy, qz, qw]): &Numbers<7>) -> anyhow::Result<
 
 /// How far a table top reaches beyond the object. [m]
 const TABLE_RIM: f64 = 0.10;
-/// Thickness of a table top. [m]
-pub(super) const TABLE_TOP: f64 = 0.03;
 
 /// A table top under the scan.
 fn table_under(scan: &Scan, height: f64) -> Obstacle {

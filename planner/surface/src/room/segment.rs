@@ -6,7 +6,8 @@ use std::collections::{BTreeMap, HashSet};
 use nalgebra::{Point3, Vector3};
 
 use super::flat::Noise;
-use super::{Plane, PlaneKind};
+use super::outline;
+use super::plane::{Plane, PlaneKind};
 use crate::scan::{CropBox, PlacedScan, View};
 
 /// An object: points that hang together and stand on floor or table.
@@ -137,7 +138,7 @@ impl Cluster {
         let carries = |plane: &Plane| match plane.kind {
             PlaneKind::Floor => true,
             PlaneKind::Table => {
-                super::outline::contains(&plane.outline, &plane.normal, &self.centre, 0.02)
+                outline::contains(&plane.outline, &plane.normal, &self.centre, 0.02)
             }
             PlaneKind::Wall => false,
         };
