@@ -80,7 +80,7 @@ fn the_wok_takes_less_than_forty_radians() {
         println!("skipped: {} is not there", data.display());
         return;
     }
-    let poses = task::read(&data.join("ur5_20240819_164816_wok.csv")).unwrap();
+    let poses = task::read(&data.join("ur5_20240819_164816_wok.csv")).unwrap().poses;
     let robot = Robot::from_urdf_file(&data.join("ur5.urdf")).unwrap();
     let config = TaskConfig {
         arm: ArmSpec { base: "base_link".into(), tip: "tool_tip".into() },

@@ -131,6 +131,38 @@ fn bad_numbers_are_named() {
 }
 
 #[test]
+fn a_shape_of_size_0_is_left_out_and_counted() {
+    for empty in [
+        "<box size='0 0 0'/>",
+        "<sphere radius='0'/>",
+        "<cylinder radius='0' length='0'/>",
+        "<capsule radius='0' length='0'/>",
+    ] {
+        let text = format!(
+            "<robot name='r'><link name='a'><collision><geometry>{empty}</geometry></collision>\
+             <collision><geometry><sphere radius='1'/></geometry></collision></link></robot>"
+        );
+        let robot = Robot::from_urdf_str(&text).unwrap();
+        let link = &robot.links()[0];
+        assert_eq!((link.collisions.len(), link.empty_shapes), (1, 1), "{empty}");
+    }
+}
+
+#[test]
+fn a_xacro_file_is_told_from_its_expansion() {
+    let head = "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>";
+    let expanded = format!("{head}<!-- <xacro:include filename='a'/> --><link name='a'/></robot>");
+    assert!(Robot::from_urdf_str(&expanded).is_ok());
+    for inner in
+        ["<xacro:property name='r' value='1'/>", "<xacro:arm><origin xyz='${x} 0'/></xacro:arm>"]
+    {
+        let error = Robot::from_urdf_str(&format!("{head}{inner}</robot>")).unwrap_err();
+        assert!(matches!(error, UrdfError::Xacro), "{error}");
+        assert!(error.to_string().contains("`xacro FILE > out.urdf`"), "{error}");
+    }
+}
+
+#[test]
 fn arms_that_cannot_be_are_named() {
     let names: Vec<String> = (0..10).map(|i| format!("l{i}")).collect();
     let chain: String = (0..9)

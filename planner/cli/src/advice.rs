@@ -10,6 +10,8 @@ use nullsweep_planner::pipeline::PipelineError;
 use nullsweep_planner::plan::PlanError;
 use nullsweep_planner::task::TaskError;
 use nullsweep_surface::ScanError;
+use nullsweep_surface::register::RegisterError;
+use nullsweep_surface::room::LevelError;
 use nullsweep_surface::scan::ScanWarning;
 
 /// A line of advice for an error, where a flag can help: that of the outermost cause with any.
@@ -32,6 +34,14 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         publish(error)
     } else if let Some(error) = error.downcast_ref() {
         collision(error)
+    } else if let Some(error) = error.downcast_ref() {
+        Some(register(error).into())
+    } else if let Some(LevelError::NoPlane { .. }) = error.downcast_ref() {
+        Some(
+            "say how the scan stands: --up X,Y,Z (against gravity, in the file's frame) with \
+             --sensor-height M, or --sensor-pose"
+                .into(),
+        )
     } else {
         None
     }
@@ -45,9 +55,25 @@ fn scan(error: &ScanError) -> Option<String> {
         ScanError::NoSurface { .. } => {
             "--scale takes the file's unit to metres: 0.001 for millimetres"
         }
+        ScanError::Malformed { cause, .. } if cause.contains("columns x, y, z are named") => {
+            "name the columns x, y, z in the file's first line"
+        }
         _ => return None,
     };
     Some(text.into())
+}
+
+fn register(error: &RegisterError) -> &'static str {
+    match error {
+        RegisterError::Overlap { .. } => {
+            "give each scan its --sensor-pose to within some 5 cm and 5\u{b0}; --as-placed takes the \
+             scans as they are placed, also where they share nothing"
+        }
+        _ => {
+            "give a better --sensor-pose for this scan, or leave it out; --as-placed takes it as it is \
+             placed"
+        }
+    }
 }
 
 /// The same for what a scan merely warns of.

@@ -15,9 +15,12 @@ mod publish;
 mod refusal;
 mod replan;
 mod robot;
+mod room;
 mod scene;
+mod scene_command;
 mod task;
 mod verify;
+mod views;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
 pub use exit::{FAILED, LOST, OK, USAGE, VIOLATIONS};
@@ -44,6 +47,8 @@ struct Cli {
 enum Command {
     /// Make a plan from scans, or from a simulated scan.
     Plan(Box<plan::PlanArgs>),
+    /// Show what is in a scanned scene: its planes, and its objects by number.
+    Scene(Box<scene_command::SceneCommandArgs>),
     /// Make a plan through given tool poses.
     Task(Box<task::TaskArgs>),
     /// Check a plan file against the scene that it was made for.
@@ -73,6 +78,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let result = match cli.command {
         Command::Plan(args) => plan::run(&args),
+        Command::Scene(args) => scene_command::run(&args),
         Command::Task(args) => task::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Publish(args) => publish::run(&args),

@@ -11,11 +11,13 @@ use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_robot::Geometry;
 use nullsweep_surface::{
-    CleanConfig, CropBox, PlacedScan, Placement, ReadOptions, Scan, scan, simulate,
+    CleanConfig, CropBox, PlacedScan, Placement, RawScan, ReadOptions, Scan, scan, simulate,
 };
 
 use crate::advice;
 use crate::bars::Bars;
+use crate::room::{self, ObjectChoice, TABLE_TOP};
+use crate::views;
 
 /// How the scans stand and what of them is swept.
 #[derive(Debug, Args)]
@@ -26,6 +28,9 @@ pub(super) struct SceneArgs {
     /// Direction against gravity in the scans' frame: x,y,z.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with = "sensor_pose")]
     up: Option<Numbers<3>>,
+    /// Take several scans as they are placed, without laying each onto those before it.
+    #[arg(long)]
+    as_placed: bool,
     /// Height of the sensor above what the object stands on. [m]
     #[arg(long, value_name = "M", requires = "up")]
     sensor_height: Option<f64>,
@@ -46,6 +51,11 @@ pub(super) struct SceneArgs {
     /// xmin,ymin,zmin,xmax,ymax,zmax.
     #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
     crop: Option<CropBox>,
+    /// Sweep only this object of the scene, by its number from `planner scene`, or the one with the
+    /// most points: N or `largest`. Without --up, --sensor-pose: gravity is found by the largest level
+    /// plane.
+    #[arg(long, value_name = "OBJECT", conflicts_with = "crop")]
+    object: Option<ObjectChoice>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -114,15 +124,21 @@ pub(super) fn scene(
     seed: u64,
     bars: &Bars,
 ) -> anyhow::Result<Scene> {
-    let (placed, region) = match demo {
-        Some(demo) => simulated(demo, seed),
-        None => (read_scans(args, scans, seed, bars)?, None),
+    let (mut scene, flying) = if let Some(choice) = args.object {
+        ensure!(demo.is_none(), "--object chooses from a scan, not from a demo");
+        let placed = read_scans(args, scans, seed, Gravity::Found, bars)?;
+        room::object(&placed, choice, seed, bars)?
+    } else {
+        let (placed, region) = match demo {
+            Some(demo) => simulated(demo, seed),
+            None => (read_scans(args, scans, seed, Gravity::Given, bars)?, None),
+        };
+        let region = args.crop.or(region);
+        Scene::seen(&placed, region.as_ref(), &CleanConfig::default())?
     };
-    let region = args.crop.or(region);
-    let (mut scene, flying) = Scene::seen(&placed, region.as_ref(), &CleanConfig::default())?;
     if !flying.is_empty() {
-        let (flying, all) = (flying.len(), placed.len());
-        bars.note(&format!("{flying} of {all} points fly alone and are taken for nothing"));
+        let flying = flying.len();
+        bars.note(&format!("{flying} points fly alone and are taken for nothing"));
     }
     if args.unseen == UnseenArg::Free && !scene.unseen.is_empty() {
         scene.unseen.clear();
@@ -149,10 +165,21 @@ fn simulated(demo: Demo, seed: u64) -> (PlacedScan, Option<CropBox>) {
     (scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose)).0, region)
 }
 
-fn read_scans(
+/// Who says which way is up and how high the sensor is, where arguments leave it open.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Gravity {
+    /// Up is z, and the lowest point rests on the support.
+    Given,
+    /// The largest level plane of the first scan.
+    Found,
+}
+
+/// Reads, places and joins the scans, with a note for all that had to be guessed.
+pub(super) fn read_scans(
     args: &SceneArgs,
     scans: &[PathBuf],
     seed: u64,
+    gravity: Gravity,
     bars: &Bars,
 ) -> anyhow::Result<PlacedScan> {
     ensure!(
@@ -162,34 +189,97 @@ fn read_scans(
         args.sensor_pose.len()
     );
     let options = ReadOptions { scale: args.scale, seed, ..ReadOptions::default() };
-    let mut joined = PlacedScan::default();
-    let mut shared: Option<Placement> = None;
-    for (i, path) in scans.iter().enumerate() {
+    let mut files = Vec::with_capacity(scans.len());
+    for path in scans {
         let raw = scan::read(path, &options)?;
         for warning in &raw.warnings {
             let advice = advice::on_warning(warning).map(|advice| format!(" ({advice})"));
             bars.note(&format!("{}: {warning}{}", path.display(), advice.unwrap_or_default()));
         }
+        files.push((path, raw));
+    }
+    let mut shared = None;
+    if args.sensor_pose.is_empty() {
+        // All files share the frame of the first one.
+        shared = Some(together(args, &files, seed, gravity, bars)?);
+    }
+    let mut joined = PlacedScan::default();
+    for (i, (path, raw)) in files.into_iter().enumerate() {
         let placement = match (args.sensor_pose.get(i), &shared) {
             (Some(pose), _) => Placement::SensorPose(isometry(pose)?),
-            // Further scans without a pose of their own share the first one's frame.
-            (None, Some(frame)) => frame.clone(),
+            (None, Some(shared)) => shared.clone(),
             (None, None) => upright(args)?,
         };
-        let (placed, pose) = scan::place(&raw, &placement);
-        let sensor = placed.views[0].sensor;
-        shared.get_or_insert(Placement::Frame { pose, sensor });
+        let (mut placed, _) = scan::place(&raw, &placement);
+        // A file with normals is a model or has been through a program that laid it in place.
+        if i > 0 && !args.as_placed && raw.normals.is_none() {
+            views::lay(&joined, &mut placed, path, bars)?;
+        }
         joined.join(placed);
     }
     Ok(joined)
 }
 
-fn upright(args: &SceneArgs) -> anyhow::Result<Placement> {
-    let up = match args.up {
-        None => Vector3::z_axis(),
-        Some(Numbers(v)) => UnitVector3::try_new(Vector3::from(v), 1e-6)
-            .context("--up must not be the zero vector")?,
+/// The one placement of files that share a frame.
+fn together(
+    args: &SceneArgs,
+    files: &[(&PathBuf, RawScan)],
+    seed: u64,
+    gravity: Gravity,
+    bars: &Bars,
+) -> anyhow::Result<Placement> {
+    let Some((path, first)) = files.first() else { return upright(args) };
+    let placement = match gravity {
+        Gravity::Found if args.sensor_height.is_none() => leveled(args, first, seed, bars)?,
+        _ => upright(args)?,
     };
+    // What is lowest of all files rests on the support.
+    let whole = match placement {
+        Placement::Up { .. } if files.len() > 1 => {
+            let points = files.iter().flat_map(|(_, raw)| raw.points.iter().copied()).collect();
+            &RawScan { points, normals: None, ..first.clone() }
+        }
+        _ => first,
+    };
+    let below = scan::below_support(whole, &placement);
+    if below > 0 {
+        let path = path.display();
+        bars.note(&format!("{path}: {below} points alone below all others: nothing rests on them"));
+    }
+    let (placed, pose) = scan::place(whole, &placement);
+    Ok(Placement::Frame { pose, sensor: placed.views[0].sensor })
+}
+
+/// The direction that `--up` gives.
+fn up(args: &SceneArgs) -> anyhow::Result<Option<UnitVector3<f64>>> {
+    let unit = |Numbers(v): Numbers<3>| {
+        UnitVector3::try_new(Vector3::from(v), 1e-6).context("--up must not be the zero vector")
+    };
+    args.up.map(unit).transpose()
+}
+
+/// The placement by the largest level plane of a scan.
+fn leveled(args: &SceneArgs, raw: &RawScan, seed: u64, bars: &Bars) -> anyhow::Result<Placement> {
+    let level = room::level(raw, up(args)?, seed)?;
+    let [x, y, z] = level.up.into_inner().into();
+    bars.note(&format!(
+        "up is {x:.4},{y:.4},{z:.4} and the file's origin {:.3} m above what things stand on, by a \
+         level plane of which {:.2} m² are seen",
+        level.height, level.area
+    ));
+    let support_height = args.support_height;
+    let placement =
+        Placement::UpAndHeight { up: level.up, sensor_height: level.height, support_height };
+    if level.camera {
+        return Ok(placement);
+    }
+    bars.note("the file's origin is no camera: which side of a surface is outside is voted for");
+    let (_, pose) = scan::place(raw, &placement);
+    Ok(Placement::Frame { pose, sensor: None })
+}
+
+fn upright(args: &SceneArgs) -> anyhow::Result<Placement> {
+    let up = up(args)?.unwrap_or(Vector3::z_axis());
     Ok(match args.sensor_height {
         Some(sensor_height) => {
             Placement::UpAndHeight { up, sensor_height, support_height: args.support_height }
@@ -206,8 +296,6 @@ fn isometry(&Numbers([x, y, z, qx, qy, qz, qw]): &Numbers<7>) -> anyhow::Result<
 
 /// How far a table top of unknown size is taken to reach beyond the object. [m]
 const TABLE_RIM: f64 = 0.45;
-/// Thickness of a table top. [m]
-const TABLE_TOP: f64 = 0.03;
 
 /// A table top under the scan.
 fn table_under(scan: &Scan, height: f64, size: Option<TableSize>) -> Obstacle {

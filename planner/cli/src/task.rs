@@ -18,7 +18,8 @@ use crate::robot::{RobotArgs, tool_file};
 
 #[derive(Debug, Args)]
 pub(super) struct TaskArgs {
-    /// Poses of the tool in the robot's root frame: time,x,y,z,qx,qy,qz,qw a line.
+    /// Poses of the tool in the robot's root frame: time,x,y,z,qx,qy,qz,qw a line, apart by commas or
+    /// blanks, time optional; names in the first line decide which column is which.
     poses: PathBuf,
     #[command(flatten)]
     robot: RobotArgs,
@@ -56,7 +57,10 @@ pub(super) struct TaskArgs {
 pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
     let robot = args.robot.robot()?;
-    let poses = task::read(&args.poses)?;
+    let task::Poses { poses, notes } = task::read(&args.poses)?;
+    for note in &notes {
+        bars.note(note);
+    }
     let tool = args.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
     let collision = args.robot.collision();
     let floor = args.floor.unwrap_or_else(|| {

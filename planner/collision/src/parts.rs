@@ -47,6 +47,12 @@ pub(crate) fn collect(
     let (mut parts, mut notes) = (Vec::new(), Vec::new());
     let moving = arm.moving_links();
     for (index, link) in robot.links().iter().enumerate() {
+        if link.empty_shapes > 0 {
+            notes.push(format!(
+                "{}: {} collision shape(s) of size 0 skipped",
+                link.name, link.empty_shapes
+            ));
+        }
         let mut missing = None;
         let mut found = Vec::new();
         for shape in &link.collisions {

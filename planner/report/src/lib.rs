@@ -27,8 +27,10 @@
 mod data;
 mod joints;
 mod page;
+mod room;
 mod scene;
 mod style;
 
 pub use data::{JointAxis, Motion, PatchMark, ReportData, ReportError, Table};
 pub use page::{render, write};
+pub use room::{RoomData, write_room};

@@ -43,20 +43,7 @@ pub fn write(path: &Path, data: &ReportData) -> Result<(), ReportError> {
 /// [`ReportError::Length`] if lists that run parallel do not.
 pub fn render(data: &ReportData) -> Result<String, ReportError> {
     data.check()?;
-    let mut page = String::with_capacity(8 << 20);
-    let title = escaped(&data.title);
-    page.push_str("<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-    page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-    let _ = writeln!(page, "<title>{title}</title>\n<style>{STYLE}</style>");
-    page.push_str(&library());
-    let _ = writeln!(page, "</head>\n<body>\n<h1>{title}</h1>");
-    let _ = writeln!(page, "<p class=\"subtitle\">{}</p>", escaped(&data.subtitle));
-    page.push_str("<div class=\"tables\">\n");
-    for table in &data.tables {
-        push_table(&mut page, table);
-    }
-    page.push_str("</div>\n");
-
+    let mut page = head(&data.title, &data.subtitle, &data.tables);
     page.push_str(
         "<h2>Surface and tool path</h2>\n<p class=\"note\">Drag to turn, scroll to zoom; a click \
          on the legend hides or shows (the graph is hidden at first). Thick lines are contact, \
@@ -80,6 +67,24 @@ pub fn render(data: &ReportData) -> Result<String, ReportError> {
     Ok(page)
 }
 
+/// How every page begins, with the plotting library, its heading and tables.
+pub(super) fn head(title: &str, subtitle: &str, tables: &[Table]) -> String {
+    let mut page = String::with_capacity(8 << 20);
+    let title = escaped(title);
+    page.push_str("<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
+    page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
+    let _ = writeln!(page, "<title>{title}</title>\n<style>{STYLE}</style>");
+    page.push_str(&library());
+    let _ = writeln!(page, "</head>\n<body>\n<h1>{title}</h1>");
+    let _ = writeln!(page, "<p class=\"subtitle\">{}</p>", escaped(subtitle));
+    page.push_str("<div class=\"tables\">\n");
+    for table in tables {
+        push_table(&mut page, table);
+    }
+    page.push_str("</div>\n");
+    page
+}
+
 /// The plotting library alone: its sources come with a formula typesetter of 2 MB behind it, which
 /// no label here needs.
 fn library() -> String {
@@ -92,7 +97,7 @@ fn library() -> String {
     sources
 }
 
-fn push_plot(page: &mut String, plot: &Plot, id: &str, style: &str) {
+pub(super) fn push_plot(page: &mut String, plot: &Plot, id: &str, style: &str) {
     let _ = writeln!(page, "<div class=\"plot\" style=\"{style}\">");
     page.push_str(&plot.to_inline_html(Some(id)));
     page.push_str("\n</div>\n");

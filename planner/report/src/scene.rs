@@ -41,6 +41,12 @@ pub(super) fn plot(data: &ReportData) -> Plot {
     for (motion, color) in data.measured.iter().zip(MEASURED.iter().cycle()) {
         path(&mut plot, &data.patches, motion, color, None);
     }
+    lay_out(&mut plot);
+    plot
+}
+
+/// Axes in true proportion, a view from above and the side, the legend.
+pub(super) fn lay_out(plot: &mut Plot) {
     let axis = |title: &str| Axis::new().title(title).grid_color("#dfe3e8").zero_line(false);
     let scene = LayoutScene::new()
         .aspect_mode(AspectMode::Data)
@@ -59,7 +65,6 @@ pub(super) fn plot(data: &ReportData) -> Plot {
         ),
     );
     plot.set_configuration(Configuration::new().responsive(true).display_logo(false));
-    plot
 }
 
 fn scan(plot: &mut Plot, data: &ReportData) {
@@ -235,14 +240,14 @@ fn thin(points: &[Point3<f64>], most: usize) -> impl Iterator<Item = Point3<f64>
 }
 
 /// Coordinates apart, as the plots want them, to a tenth of a millimetre; a gap is a null.
-struct Cloud {
+pub(super) struct Cloud {
     x: Vec<Option<f64>>,
     y: Vec<Option<f64>>,
     z: Vec<Option<f64>>,
 }
 
 impl Cloud {
-    fn new(points: impl IntoIterator<Item = Option<Point3<f64>>>) -> Self {
+    pub(super) fn new(points: impl IntoIterator<Item = Option<Point3<f64>>>) -> Self {
         let mut cloud = Self { x: Vec::new(), y: Vec::new(), z: Vec::new() };
         let round = |value: f64| (value * 1e4).round() / 1e4;
         for point in points {
@@ -253,7 +258,7 @@ impl Cloud {
         cloud
     }
 
-    fn trace(
+    pub(super) fn trace(
         self,
         name: &str,
         mode: Mode,

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 use nullsweep_collision::{Obstacle, Options};
 use nullsweep_robot::{ArmSpec, Tool};
 
-use super::read::Tolerance;
+use super::tolerance::Tolerance;
 
 /// What is to be planned.
 #[derive(Clone, Debug)]

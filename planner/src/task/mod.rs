@@ -13,9 +13,11 @@ mod route;
 mod run;
 mod search;
 mod space;
+mod tolerance;
 
 pub use config::{TaskConfig, floor_under, tip_tool};
 pub use error::TaskError;
 pub use figures::TaskFigures;
-pub use read::{PosesError, Tolerance, read};
+pub use read::{Poses, PosesError, read};
 pub use run::{TaskOutcome, run};
+pub use tolerance::Tolerance;

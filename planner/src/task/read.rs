@@ -1,43 +1,8 @@
 //! Reading tool poses and tolerances.
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-
-/// How far the tool may be from a pose and still meet it.
-///
-/// Along and about the axes of the pose: x, y, z \[m\], then the tilt of the tool's z axis about x
-/// and y and the turn about z \[rad\], each to either side; infinite: free.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerance(pub [f64; 6]);
-
-impl Tolerance {
-    /// Position and axis of the tool exact, the turn about its axis free.
-    pub const AXIS: Self = Self([0.0, 0.0, 0.0, 0.0, 0.0, f64::INFINITY]);
-}
-
-impl FromStr for Tolerance {
-    type Err = String;
-
-    /// Six numbers, comma-separated, or `free`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts: Vec<f64> = text
-            .split(',')
-            .map(|part| match part.trim() {
-                "free" => Ok(f64::INFINITY),
-                number => match number.parse::<f64>() {
-                    Ok(value) if value >= 0.0 => Ok(value),
-                    _ => Err(format!("`{number}`: a number of at least 0, or `free`, is wanted")),
-                },
-            })
-            .collect::<Result<_, _>>()?;
-        parts
-            .try_into()
-            .map(Self)
-            .map_err(|v: Vec<f64>| format!("{} numbers, not 6: X,Y,Z,RX,RY,RZ", v.len()))
-    }
-}
 
 /// Why a file of poses cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -72,34 +37,114 @@ pub enum PosesError {
     },
 }
 
-/// Reads poses of the tool in the robot's root frame from comma-separated text: seven numbers a
-/// line (position \[m\], unit quaternion x, y, z, w), or eight with a time before them, which is
-/// not looked at. A first line without numbers is a heading.
+/// Poses from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Poses {
+    /// Of the tool in the robot's root frame. \[m\]
+    pub poses: Vec<Isometry3<f64>>,
+    /// What had to be mended or guessed, in words.
+    pub notes: Vec<String>,
+}
+
+/// How far the length of a quaternion may be from 1: two decimals and their rounding.
+const LENGTH: f64 = 0.02;
+
+/// How far it may be without a word.
+const EXACT: f64 = 1e-3;
+
+/// Reads poses of the tool in the robot's root frame from text, its numbers apart by commas,
+/// semicolons, tabs or blanks: seven a line (position \[m\], unit quaternion x, y, z, w), or eight
+/// with a time before them, which is not looked at. Names in a line before the poses, or in a
+/// comment there, decide which column is which. A quaternion whose length is within 2 % of 1 is
+/// normalised, which is noted.
 ///
 /// # Errors
 /// Names the file and the line.
-pub fn read(path: &Path) -> Result<Vec<Isometry3<f64>>, PosesError> {
+pub fn read(path: &Path) -> Result<Poses, PosesError> {
     let text = std::fs::read_to_string(path)
         .map_err(|source| PosesError::File { path: path.into(), source })?;
     let mut poses = Vec::new();
-    for (k, line) in text.lines().enumerate() {
-        let line = line.trim_start_matches('\u{feff}').trim();
-        let heading = k == 0 && line.split(',').all(|part| part.trim().parse::<f64>().is_err());
-        if line.is_empty() || line.starts_with('#') || heading {
+    let mut columns: Option<[usize; 7]> = None;
+    let mut worst: Option<(usize, f64)> = None;
+    let mut rounded = 0;
+    for (k, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        let comment = ["#", "//", "%"].iter().any(|mark| line.trim_start().starts_with(mark));
+        let cells = cells(line.trim_start_matches(['#', '/', '%', ' ']));
+        let heading = poses.is_empty() && cells.iter().all(|cell| cell.parse::<f64>().is_err());
+        if cells.is_empty() || comment || heading {
+            if poses.is_empty() {
+                columns = named(&cells).or(columns);
+            }
             continue;
         }
-        let pose =
-            pose(line).map_err(|what| PosesError::Line { path: path.into(), line: k + 1, what })?;
+        let at = |what| PosesError::Line { path: path.into(), line: k + 1, what };
+        let (pose, length) = pose(&cells, columns).map_err(at)?;
+        let off = (length - 1.0).abs();
+        if off > EXACT {
+            rounded += 1;
+            if worst.is_none_or(|(_, before)| off > (before - 1.0).abs()) {
+                worst = Some((k + 1, length));
+            }
+        }
         poses.push(pose);
     }
-    if poses.is_empty() { Err(PosesError::Empty { path: path.into() }) } else { Ok(poses) }
+    if poses.is_empty() {
+        return Err(PosesError::Empty { path: path.into() });
+    }
+    let note = |(line, length): (usize, f64)| {
+        format!(
+            "{}: {rounded} quaternions normalised, whose length is not 1; it is {length:.4} in line \
+             {line}",
+            path.display()
+        )
+    };
+    Ok(Poses { poses, notes: worst.map(note).into_iter().collect() })
 }
 
-fn pose(line: &str) -> Result<Isometry3<f64>, String> {
-    let numbers: Vec<f64> = line
-        .split(',')
-        .map(|part| part.trim().parse::<f64>().map_err(|e| format!("`{}`: {e}", part.trim())))
-        .collect::<Result<_, _>>()?;
+/// The cells of a line, without quotes.
+fn cells(line: &str) -> Vec<&str> {
+    let mark = [',', ';', '\t'].into_iter().find(|&mark| line.contains(mark));
+    let all: Vec<&str> = match mark {
+        Some(mark) => line.trim().split(mark).collect(),
+        None => line.split_ascii_whitespace().collect(),
+    };
+    let cells: Vec<&str> =
+        all.iter().map(|cell| cell.trim().trim_matches(['"', '\'']).trim()).collect();
+    if cells == [""] { Vec::new() } else { cells }
+}
+
+/// The columns of x, y, z, qx, qy, qz, qw by their names.
+fn named(names: &[&str]) -> Option<[usize; 7]> {
+    const NAMES: [&[&str]; 7] = [
+        &["x", "px", "tx", "positionx", "posx", "translationx"],
+        &["y", "py", "ty", "positiony", "posy", "translationy"],
+        &["z", "pz", "tz", "positionz", "posz", "translationz"],
+        &["qx", "orientationx", "rotationx", "quatx", "quaternionx"],
+        &["qy", "orientationy", "rotationy", "quaty", "quaterniony"],
+        &["qz", "orientationz", "rotationz", "quatz", "quaternionz"],
+        &["qw", "orientationw", "rotationw", "quatw", "quaternionw"],
+    ];
+    let plain = |name: &str| {
+        let name = name.split(['[', '(']).next().unwrap_or(name);
+        name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase()
+    };
+    let names: Vec<String> = names.iter().map(|name| plain(name)).collect();
+    let mut columns = [0; 7];
+    for (column, wanted) in columns.iter_mut().zip(NAMES) {
+        *column = names.iter().position(|name| wanted.contains(&name.as_str()))?;
+    }
+    Some(columns)
+}
+
+/// The pose in a line and the length of its quaternion as it is there.
+fn pose(cells: &[&str], columns: Option<[usize; 7]>) -> Result<(Isometry3<f64>, f64), String> {
+    let numbers: Vec<f64> = match columns {
+        Some(columns) => {
+            let cell = |&i: &usize| cells.get(i).ok_or(format!("{} cells", cells.len()));
+            columns.iter().map(|i| number(cell(i)?)).collect::<Result<_, _>>()?
+        }
+        None => cells.iter().map(|cell| number(cell)).collect::<Result<_, _>>()?,
+    };
     let [x, y, z, qx, qy, qz, qw] = match numbers.as_slice() {
         [_, rest @ ..] if rest.len() == 7 => rest,
         rest => rest,
@@ -110,11 +155,16 @@ fn pose(line: &str) -> Result<Isometry3<f64>, String> {
         return Err("a number is not finite".into());
     }
     let quaternion = Quaternion::new(qw, qx, qy, qz);
-    if (quaternion.norm() - 1.0).abs() > 1e-3 {
-        return Err(format!("the quaternion's length is {:.4}, not 1", quaternion.norm()));
+    let length = quaternion.norm();
+    if (length - 1.0).abs() > LENGTH {
+        return Err(format!("the quaternion's length is {length:.4}, not 1"));
     }
     let rotation = UnitQuaternion::new_normalize(quaternion);
-    Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+    Ok((Isometry3::from_parts(Translation3::new(x, y, z), rotation), length))
+}
+
+fn number(cell: &str) -> Result<f64, String> {
+    cell.parse().map_err(|e| format!("`{cell}`: {e}"))
 }
 
 #[cfg(test)]
@@ -123,7 +173,7 @@ mod tests {
 
     use super::*;
 
-    fn read_text(text: &str) -> Result<Vec<Isometry3<f64>>, PosesError> {
+    fn read_text(text: &str) -> Result<Poses, PosesError> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(text.as_bytes()).unwrap();
         read(file.path())
@@ -131,10 +181,44 @@ mod tests {
 
     #[test]
     fn reads_poses_with_and_without_time() {
-        let poses = read_text("time,x,y,z,a,b,c,d\n0,1,2,3,0,0,0,1\n\n1,4,5,6,1,0,0,0\n").unwrap();
+        let text = "time,x,y,z,a,b,c,d\n0,1,2,3,0,0,0,1\n\n1,4,5,6,1,0,0,0\n";
+        let poses = read_text(text).unwrap().poses;
         assert_eq!(poses.len(), 2);
         assert_eq!(poses[1].translation.vector, nalgebra::Vector3::new(4.0, 5.0, 6.0));
-        assert_eq!(read_text("1,2,3,0,0,0,1").unwrap()[0], poses[0]);
+        assert_eq!(read_text("1,2,3,0,0,0,1").unwrap().poses[0], poses[0]);
+    }
+
+    #[test]
+    fn reads_what_other_programs_write() {
+        let wanted = read_text("1,2,3,0,0,0.6,0.8").unwrap();
+        assert_eq!(wanted.notes, Vec::<String>::new());
+        for text in [
+            "# timestamp tx ty tz qx qy qz qw\n0.0 1 2 3 0 0 0.6 0.8\n",
+            "# exported\n\"t\",\"x\",\"y\",\"z\",\"qx\",\"qy\",\"qz\",\"qw\"\n0,1,2,3,0,0,0.6,0.8\n",
+            "qw;qx;qy;qz;x [m];y [m];z [m]\n0.8;0;0;0.6;1;2;3\n",
+            "field.position.x,field.position.y\nposition.x,position.y,position.z,orientation.x,\
+             orientation.y,orientation.z,orientation.w\n1,2,3,0,0,0.6,0.8\n",
+            "0\t1\t2\t3\t0\t0\t0.6\t0.8\n",
+        ] {
+            assert_eq!(read_text(text).unwrap(), wanted, "{text}");
+        }
+        let rounded = read_text("1,2,3,0,0,0.61,0.8\n1,2,3,0,0,0,1\n").unwrap();
+        assert!((rounded.poses[0].rotation.norm() - 1.0).abs() < 1e-12);
+        assert!(rounded.notes[0].contains("1 quaternions normalised"), "{:?}", rounded.notes);
+        assert!(rounded.notes[0].ends_with("it is 1.0060 in line 1"), "{:?}", rounded.notes);
+    }
+
+    #[test]
+    fn reported_pose_lists_are_read() {
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/reports"));
+        if !folder.is_dir() {
+            eprintln!("skipped: the test data {} is not here", folder.display());
+            return;
+        }
+        for (file, notes) in [("tum_space.txt", 0), ("round2.csv", 1), ("header2.csv", 0)] {
+            let read = read(&folder.join(file)).unwrap();
+            assert_eq!((read.poses.len(), read.notes.len()), (209, notes), "{file}");
+        }
     }
 
     #[test]
@@ -151,13 +235,5 @@ mod tests {
             }
         }
         assert!(matches!(read_text("a,b\n"), Err(PosesError::Empty { .. })));
-    }
-
-    #[test]
-    fn reads_tolerances() {
-        let wok: Tolerance = "0.05,0.05,0,0,0,free".parse().unwrap();
-        assert_eq!(wok, Tolerance([0.05, 0.05, 0.0, 0.0, 0.0, f64::INFINITY]));
-        assert!("1,2,3".parse::<Tolerance>().is_err());
-        assert!("0,0,0,0,0,-1".parse::<Tolerance>().is_err());
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use nullsweep_collision::{ToolContact, World};
 use nullsweep_robot::{Arm, Jacobian, JointVector, MAX_DOF, Tool, damped_step, wrap};
 
-use super::read::Tolerance;
+use super::tolerance::Tolerance;
 use crate::sweep::distance_to_segment;
 
 /// The arm, its tool and its tolerances.

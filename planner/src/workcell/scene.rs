@@ -90,9 +90,16 @@ impl Scene {
             None => clean(scan, config)?,
             Some(region) => clean_region(scan, region, config)?,
         };
+        Ok(Self::around(surface, scan))
+    }
+
+    /// A surface that was made of a part of placed views, on the floor, and everything else that
+    /// they show or hide. Second, the flying pixels, which are taken for nothing.
+    #[must_use]
+    pub fn around(surface: Scan, scan: &PlacedScan) -> (Self, Vec<Point3<f64>>) {
         let Measured { raw, rest, flying } = measured(scan, &surface);
         let unseen = unseen::border(scan, &surface);
-        Ok((Self { surroundings: rest, raw, unseen, ..Self::on_floor(surface) }, flying))
+        (Self { surroundings: rest, raw, unseen, ..Self::on_floor(surface) }, flying)
     }
 
     /// The scene with fewer points around the surface, to judge many stances by.

@@ -3,7 +3,8 @@
 //! Files of points or meshes become a [`RawScan`], placed in the floor frame and cleaned to a
 //! [`Scan`]: points with normals. [`patches`] cuts it into the planar pieces that a tool has to
 //! visit; a [`Surface`] lies between its points and gives the line from one piece to the next.
-//! [`simulate`] makes scans where no camera is at hand. Nothing here knows a robot.
+//! [`mod@room`] finds the planes and objects of a whole scene, [`mod@register`] lays one view onto
+//! others. [`simulate`] makes scans where no camera is at hand. Nothing here knows a robot.
 //!
 //! All lengths are metres, all angles radians. The same input and seed give bit-identical results,
 //! whatever the number of threads.
@@ -38,6 +39,9 @@ mod fit;
 mod grid;
 
 pub mod scan;
+
+pub mod register;
+pub mod room;
 
 pub mod patches;
 mod sheet;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum UrdfError {
     /// The file could not be read.
-    #[error("cannot read URDF {path}: {source}; check the path (a xacro file must be expanded)")]
+    #[error("cannot read URDF {path}: {source}; check the path")]
     Read {
         /// The file.
         path: PathBuf,
@@ -19,6 +19,9 @@ pub enum UrdfError {
         /// What the parser said.
         reason: String,
     },
+    /// The text is a xacro file.
+    #[error("this is a xacro file, not a URDF: expand it with `xacro FILE > out.urdf`")]
+    Xacro,
     /// There is no link.
     #[error("the URDF has no link")]
     Empty,

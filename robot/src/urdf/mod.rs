@@ -14,7 +14,7 @@ pub use model::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, SafetyController,
 };
 use read::build;
-use xml::joint_facts;
+use xml::{is_xacro, joint_facts};
 
 /// A whole robot: one tree of links joined by joints, from a URDF.
 ///
@@ -40,6 +40,9 @@ impl Robot {
     /// # Errors
     /// When the text is not one proper kinematic tree; see [`UrdfError`].
     pub fn from_urdf_str(xml: &str) -> Result<Self, UrdfError> {
+        if is_xacro(xml) {
+            return Err(UrdfError::Xacro);
+        }
         let facts = joint_facts(xml).map_err(|reason| UrdfError::Parse { reason })?;
         let parsed = urdf_rs::read_from_string(xml)
             .map_err(|e| UrdfError::Parse { reason: e.to_string() })?;

@@ -21,6 +21,9 @@ pub struct Link {
     pub name: String,
     /// Collision shapes; may be none.
     pub collisions: Vec<CollisionShape>,
+    /// Collision shapes of size 0 in the URDF: points, which are no shapes and are not in
+    /// `collisions`.
+    pub empty_shapes: usize,
     /// Index of the joint that moves this link; none for the root.
     pub parent_joint: Option<usize>,
 }

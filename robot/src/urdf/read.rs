@@ -83,9 +83,11 @@ fn unique<'a>(
 }
 
 fn read_link(link: &urdf_rs::Link) -> Result<Link, UrdfError> {
-    let collisions = link
+    let solid = |c: &&urdf_rs::Collision| !is_empty(&c.geometry);
+    let collisions: Vec<CollisionShape> = link
         .collision
         .iter()
+        .filter(solid)
         .map(|c| {
             let geometry = read_geometry(&c.geometry)
                 .ok_or_else(|| UrdfError::BadGeometry { link: link.name.clone() })?;
@@ -93,7 +95,19 @@ fn read_link(link: &urdf_rs::Link) -> Result<Link, UrdfError> {
             Ok(CollisionShape { origin, geometry })
         })
         .collect::<Result<_, UrdfError>>()?;
-    Ok(Link { name: link.name.clone(), collisions, parent_joint: None })
+    let empty_shapes = link.collision.len() - collisions.len();
+    Ok(Link { name: link.name.clone(), collisions, empty_shapes, parent_joint: None })
+}
+
+/// Whether all sizes of a shape are 0: some programs write that for a link without a shape.
+fn is_empty(geometry: &urdf_rs::Geometry) -> bool {
+    match geometry {
+        urdf_rs::Geometry::Box { size } => size.iter().all(|&s| s == 0.0),
+        urdf_rs::Geometry::Cylinder { radius, length }
+        | urdf_rs::Geometry::Capsule { radius, length } => *radius == 0.0 && *length == 0.0,
+        urdf_rs::Geometry::Sphere { radius } => *radius == 0.0,
+        urdf_rs::Geometry::Mesh { .. } => false,
+    }
 }
 
 /// `None` when a size is not a positive number.

@@ -30,6 +30,22 @@ pub(crate) struct JointFacts {
     pub(crate) has_k_position: bool,
 }
 
+/// Whether elements of xacro are in the text, that is not yet expanded.
+pub(crate) fn is_xacro(text: &str) -> bool {
+    let mut reader = Reader::from_str(text);
+    loop {
+        match reader.read_event() {
+            Ok(Event::Start(e) | Event::Empty(e)) => {
+                if e.name().as_ref().starts_with("xacro:") {
+                    return true;
+                }
+            }
+            Ok(Event::Eof) | Err(_) => return false,
+            Ok(_) => {}
+        }
+    }
+}
+
 /// Reads the facts of every joint by name, and checks that vectors are three numbers.
 pub(crate) fn joint_facts(text: &str) -> Result<HashMap<String, JointFacts>, String> {
     let mut reader = Reader::from_str(text);

@@ -112,7 +112,8 @@ const COLLISION: &[&str] = &[
     "fixed", "moving", "motion", "never", "world", "check", "proof",
 ];
 
-const SURFACE: &[&str] = &["grid", "fit", "scan", "simulate", "sheet", "patches", "unseen"];
+const SURFACE: &[&str] =
+    &["grid", "fit", "scan", "simulate", "room", "register", "sheet", "patches", "unseen"];
 
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[

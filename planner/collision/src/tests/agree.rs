@@ -78,6 +78,28 @@ fn free_motions_are_free_all_along() {
 }
 
 #[test]
+fn a_shape_of_size_0_is_told() {
+    let joint = |i: usize| {
+        format!(
+            "<joint name='j{i}' type='revolute'><parent link='l{i}'/><child link='l{}'/>\
+             <origin xyz='0 0 0.3'/><axis xyz='0 1 0'/>\
+             <limit lower='-2' upper='2' effort='1' velocity='1'/></joint>",
+            i + 1
+        )
+    };
+    let text = format!(
+        "<robot name='r'><link name='l0'><collision><geometry><box size='0 0 0'/></geometry>\
+         </collision></link><link name='l1'/><link name='l2'/>{}{}</robot>",
+        joint(0),
+        joint(1)
+    );
+    let robot = Robot::from_urdf_str(&text).unwrap();
+    let arm = robot.arm(&ArmSpec { base: "l0".into(), tip: "l2".into() }).unwrap();
+    let world = World::new(&robot, &arm, &Tool::default(), &[], &[], &Options::default()).unwrap();
+    assert_eq!(world.notes(), ["l0: 1 collision shape(s) of size 0 skipped"]);
+}
+
+#[test]
 fn meshes_fast_check_agrees_with_exact() {
     let folder = tempfile::tempdir().unwrap();
     let robot = mesh_robot(folder.path());

@@ -154,21 +154,29 @@ fn gather(scan: &PlacedScan) -> Vec<Sample> {
 fn merge(samples: &mut Vec<Sample>, voxel: f64, max_points: usize) -> f64 {
     // Below a tenth of a millimetre the keys would leave their range; no depth sensor sees that.
     let mut voxel = voxel.max(1e-4);
+    let key = |sample: &Sample, voxel: f64| {
+        (sample.view, [0, 1, 2].map(|axis| (sample.point[axis] / voxel).floor() as i64))
+    };
     loop {
-        // A tree map, as the order of a hash map is not that of the last run.
-        let mut cells: BTreeMap<(usize, [i64; 3]), (Sample, f64)> = BTreeMap::new();
-        for sample in samples.iter() {
-            let key = [0, 1, 2].map(|axis| (sample.point[axis] / voxel).floor() as i64);
-            cells
-                .entry((sample.view, key))
-                .and_modify(|(sum, count)| {
-                    sum.point += sample.point.coords;
-                    sum.hint += sample.hint;
-                    *count += 1.0;
-                })
-                .or_insert_with(|| (sample.clone(), 1.0));
-        }
-        if cells.len() <= max_points {
+        // Counted before they are made: of millions of points, nearly as many cells would be there.
+        let mut keys: Vec<(usize, [i64; 3])> = samples.iter().map(|s| key(s, voxel)).collect();
+        keys.par_sort_unstable();
+        keys.dedup();
+        let count = keys.len();
+        drop(keys);
+        if count <= max_points {
+            // A tree map, as the order of a hash map is not that of the last run.
+            let mut cells: BTreeMap<(usize, [i64; 3]), (Sample, f64)> = BTreeMap::new();
+            for sample in samples.iter() {
+                cells
+                    .entry(key(sample, voxel))
+                    .and_modify(|(sum, count)| {
+                        sum.point += sample.point.coords;
+                        sum.hint += sample.hint;
+                        *count += 1.0;
+                    })
+                    .or_insert_with(|| (sample.clone(), 1.0));
+            }
             let mean = |(mut sum, count): (Sample, f64)| {
                 sum.point /= count;
                 sum
@@ -177,7 +185,7 @@ fn merge(samples: &mut Vec<Sample>, voxel: f64, max_points: usize) -> f64 {
             return voxel;
         }
         // Points on a surface thin out with the square of the voxel.
-        let ratio = (cells.len() as f64 / max_points.max(1) as f64).sqrt();
+        let ratio = (count as f64 / max_points.max(1) as f64).sqrt();
         voxel *= ratio.clamp(1.05, 4.0);
     }
 }

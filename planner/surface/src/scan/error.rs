@@ -1,4 +1,4 @@
-//! What can be wrong with a scan, and what is merely worth saying.
+//! What can be wrong with a scan.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -23,6 +23,16 @@ pub enum ScanError {
     UnknownFormat {
         /// The file.
         path: PathBuf,
+    },
+    /// The file is of a format that is known but not read.
+    #[error("{}: {format} files are not read; convert it: `{convert}`", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: &'static str,
+        /// A command that makes a file of it that is read.
+        convert: String,
     },
     /// The file breaks its own format.
     #[error("{}: {place}: {cause}", path.display())]
@@ -105,50 +115,6 @@ impl fmt::Display for Place {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
             Self::Byte(byte) => write!(f, "byte {byte}"),
-        }
-    }
-}
-
-/// Something about a scan that its user should know, though it was accepted.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ScanWarning {
-    /// The extent suggests that the file is not in metres.
-    LooksLikeMillimetres {
-        /// Longest side of the bounding box. \[m\]
-        extent: f64,
-    },
-    /// Points were dropped as NaN or infinite; depth cameras mark missing pixels so.
-    NonFinite {
-        /// How many.
-        dropped: usize,
-    },
-    /// The file goes on after the points that its header announces.
-    TrailingData {
-        /// Where the surplus begins.
-        place: Place,
-    },
-    /// A mesh needed a wider sampling than asked for to stay within the point limit.
-    SpacingWidened {
-        /// The spacing used. \[m\]
-        spacing: f64,
-    },
-}
-
-impl fmt::Display for ScanWarning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::LooksLikeMillimetres { extent } => {
-                write!(f, "the points span {extent:.0} m: are they in millimetres?")
-            }
-            Self::NonFinite { dropped } => {
-                write!(f, "{dropped} points dropped as not finite (pixels without depth)")
-            }
-            Self::TrailingData { place } => {
-                write!(f, "data from {place} on ignored: the header announces fewer points")
-            }
-            Self::SpacingWidened { spacing } => {
-                write!(f, "the mesh is large: sampled every {:.1} mm", spacing * 1e3)
-            }
         }
     }
 }

@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
+use super::decode::{decode, number, without_bom};
 use super::error::{Malformed, Place, malformed};
 use super::parsed::Parsed;
-use super::text::{as_text, without_bom};
+use super::warning::ScanWarning;
 
 /// Reads an STL mesh, ascii or binary.
 pub(super) fn parse_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
@@ -14,21 +15,15 @@ pub(super) fn parse_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
     const FACET: usize = 50;
     let announced = bytes.get(80..HEADER).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]));
     // Some binary files begin with "solid" too, so the length decides.
-    if let Some(count) = announced
-        && (count as usize).checked_mul(FACET).and_then(|n| n.checked_add(HEADER))
-            == Some(bytes.len())
-    {
-        let mut mesh = Soup::default();
-        for facet in bytes[HEADER..].chunks_exact(FACET) {
-            let number = |i: usize| {
-                let at = 12 + 4 * i;
-                f32::from_le_bytes([facet[at], facet[at + 1], facet[at + 2], facet[at + 3]])
-            };
-            mesh.triangle([0, 3, 6].map(|i| [number(i), number(i + 1), number(i + 2)]));
-        }
-        return Ok(mesh.parsed);
+    let needed = announced.and_then(|n| (n as usize).checked_mul(FACET)?.checked_add(HEADER));
+    let whole = needed == Some(bytes.len());
+    let text = without_bom(bytes).trim_ascii_start();
+    let ascii = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+        && !bytes.contains(&0);
+    if !whole && ascii {
+        return parse_ascii_stl(bytes);
     }
-    if !without_bom(bytes).trim_ascii_start().starts_with(b"solid") {
+    let Some(needed) = needed.filter(|&n| n > HEADER && n <= bytes.len()) else {
         let cause = match announced {
             Some(count) => format!(
                 "{count} facets of {FACET} bytes after the header do not make a file of {} bytes",
@@ -37,19 +32,36 @@ pub(super) fn parse_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
             None => "too short for a binary STL, and an ascii one begins with \"solid\"".into(),
         };
         return malformed(Place::Byte(bytes.len().min(80)), cause);
+    };
+    let mut mesh = Soup::default();
+    for facet in bytes[HEADER..needed].chunks_exact(FACET) {
+        let number = |i: usize| {
+            let at = 12 + 4 * i;
+            f32::from_le_bytes([facet[at], facet[at + 1], facet[at + 2], facet[at + 3]])
+        };
+        mesh.triangle([0, 3, 6].map(|i| [number(i), number(i + 1), number(i + 2)]));
     }
-    parse_ascii_stl(bytes)
+    if !whole {
+        let place = Place::Byte(needed);
+        mesh.parsed.warnings.push(ScanWarning::TrailingData { place });
+    }
+    Ok(mesh.parsed)
 }
 
 fn parse_ascii_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let mut mesh = Soup::default();
     let mut corners = Vec::with_capacity(3);
+    let mut in_facet = false;
     let mut closed = false;
     let mut line = 0;
-    for text in as_text(bytes)?.lines() {
+    let content = decode(bytes, &mut mesh.parsed.warnings)?;
+    for text in content.lines() {
         line += 1;
         let mut tokens = text.split_ascii_whitespace();
-        match tokens.next() {
+        let word = tokens.next().map(str::to_ascii_lowercase);
+        match word.as_deref() {
+            Some("solid") => closed = false,
+            Some("facet") => in_facet = true,
             Some("vertex") => {
                 corners.push(numbers(&mut tokens, Place::Line(line))?.map(|v| v as f32))
             }
@@ -61,12 +73,16 @@ fn parse_ascii_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
                 mesh.triangle(triangle);
                 corners.clear();
             }
+            Some("endfacet") => in_facet = false,
             Some("endsolid") => closed = true,
             _ => {}
         }
     }
+    if in_facet || !corners.is_empty() {
+        return malformed(Place::Line(line), "the file ends within a facet, before endsolid");
+    }
     if !closed {
-        return malformed(Place::Line(line), "the file ends before endsolid");
+        mesh.parsed.warnings.push(ScanWarning::NoEnd);
     }
     Ok(mesh.parsed)
 }
@@ -75,8 +91,24 @@ fn parse_ascii_stl(bytes: &[u8]) -> Result<Parsed, Malformed> {
 pub(super) fn parse_obj(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let mut parsed = Parsed::default();
     let mut corners = Vec::new();
-    for (index, text) in as_text(bytes)?.lines().enumerate() {
+    let content = decode(bytes, &mut parsed.warnings)?;
+    // A statement that goes on in the next line ends with a backslash.
+    let mut begun = String::new();
+    for (index, text) in content.lines().enumerate() {
         let place = Place::Line(index + 1);
+        let whole;
+        let text = match text.trim_end().strip_suffix('\\') {
+            Some(part) => {
+                begun += part;
+                begun.push(' ');
+                continue;
+            }
+            None if begun.is_empty() => text,
+            None => {
+                whole = std::mem::take(&mut begun) + text;
+                &whole
+            }
+        };
         let mut tokens = text.split_ascii_whitespace();
         match tokens.next() {
             Some("v") => parsed.points.push(Point3::from(numbers(&mut tokens, place)?)),
@@ -94,6 +126,10 @@ pub(super) fn parse_obj(bytes: &[u8]) -> Result<Parsed, Malformed> {
             }
             _ => {}
         }
+    }
+    if !begun.is_empty() {
+        let last = Place::Line(content.lines().count());
+        return malformed(last, "the file ends within a statement: its last line has a backslash");
     }
     Ok(parsed)
 }
@@ -123,8 +159,8 @@ fn numbers<'a>(
         let Some(token) = tokens.next() else {
             return malformed(place, format!("a vertex of {i} numbers where three are needed"));
         };
-        *value =
-            token.parse().or_else(|_| malformed(place, format!("{token:?} is not a number")))?;
+        *value = number(token)
+            .ok_or_else(|| Malformed { place, cause: format!("{token:?} is not a number") })?;
     }
     Ok(values)
 }
@@ -243,6 +279,7 @@ mod tests {
         let first = read(obj, Format::Obj).unwrap();
         assert_eq!(first, read(obj, Format::Obj).unwrap());
         assert_eq!(first.points.len(), MAX_SAMPLES as usize);
-        assert!(matches!(first.warnings[..], [ScanWarning::SpacingWidened { .. }]));
+        let widened = |w: &ScanWarning| matches!(w, ScanWarning::SpacingWidened { .. });
+        assert!(first.warnings.iter().any(widened));
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::error::ScanWarning;
+use super::warning::ScanWarning;
 
 /// What a parser hands over: everything in the file's unit, nothing filtered.
 #[derive(Debug, Default)]

@@ -5,9 +5,10 @@
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::error::{Malformed, Place, ScanWarning, malformed};
+use super::decode::{number, without_bom};
+use super::error::{Malformed, Place, malformed};
 use super::parsed::Parsed;
-use super::text::without_bom;
+use super::warning::ScanWarning;
 
 /// Longest header that is looked for. \[byte\]
 const MAX_HEADER: usize = 1 << 16;
@@ -18,8 +19,9 @@ const MAX_LZF_RATIO: usize = 88;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let skipped = bytes.len() - without_bom(bytes).len();
-    let header = Header::parse(bytes, skipped)?;
-    let mut parsed = Parsed { viewpoint: header.viewpoint, ..Parsed::default() };
+    let mut parsed = Parsed::default();
+    let header = Header::parse(bytes, skipped, &mut parsed.warnings)?;
+    parsed.viewpoint = header.viewpoint;
     match header.encoding {
         Encoding::Ascii => ascii(bytes, &header, &mut parsed)?,
         Encoding::Binary => binary(bytes, &header, &mut parsed)?,
@@ -87,7 +89,11 @@ struct Header {
 }
 
 impl Header {
-    fn parse(bytes: &[u8], skipped: usize) -> Result<Self, Malformed> {
+    fn parse(
+        bytes: &[u8],
+        skipped: usize,
+        warnings: &mut Vec<ScanWarning>,
+    ) -> Result<Self, Malformed> {
         let mut entries = Entries::default();
         let mut offset = skipped;
         let mut line = 0;
@@ -102,8 +108,8 @@ impl Header {
                 };
                 return malformed(Place::Line(line), cause);
             };
-            let text = std::str::from_utf8(&rest[..end])
-                .or_else(|_| malformed(Place::Line(line), "the header is not text (UTF-8)"))?;
+            // What is not UTF-8 can only be in a comment or make an entry wrong.
+            let text = String::from_utf8_lossy(&rest[..end]);
             offset += end + 1;
             let mut tokens =
                 text.split('#').next().unwrap_or("").split_ascii_whitespace().map(str::to_owned);
@@ -115,10 +121,15 @@ impl Header {
                 break;
             }
         }
-        Self::from_entries(&entries, offset, line)
+        Self::from_entries(&entries, offset, line, warnings)
     }
 
-    fn from_entries(entries: &Entries, body: usize, lines: usize) -> Result<Self, Malformed> {
+    fn from_entries(
+        entries: &Entries,
+        body: usize,
+        lines: usize,
+        warnings: &mut Vec<ScanWarning>,
+    ) -> Result<Self, Malformed> {
         let (fields_line, names) = entries.get("FIELDS").or_else(|_| entries.get("COLUMNS"))?;
         if names.is_empty() {
             return malformed(fields_line, "FIELDS names no field");
@@ -164,7 +175,7 @@ impl Header {
         };
         let normal =
             triple("normal_x", "normal_y", "normal_z").or_else(|| triple("nx", "ny", "nz"));
-        let points = Self::points(entries)?;
+        let points = Self::points(entries, warnings)?;
         let (data_line, data) = entries.get("DATA")?;
         let encoding = match data.first().map(String::as_str) {
             Some("ascii") => Encoding::Ascii,
@@ -182,18 +193,40 @@ impl Header {
         Ok(Self { fields, points, encoding, viewpoint, position, normal, record, body, lines })
     }
 
-    fn points(entries: &Entries) -> Result<usize, Malformed> {
-        let (width_line, width) = entries.single("WIDTH")?;
-        let (height_line, height) = entries.single("HEIGHT")?;
-        let (points_line, points) = entries.single("POINTS")?;
-        let width = parse_count(width_line, "WIDTH", &width)?;
-        let height = parse_count(height_line, "HEIGHT", &height)?;
-        let points = parse_count(points_line, "POINTS", &points)?;
-        if width.checked_mul(height) != Some(points) {
-            let cause = format!("POINTS {points} is not WIDTH {width} times HEIGHT {height}");
-            return malformed(points_line, cause);
+    /// POINTS, or WIDTH times HEIGHT; a line that is not there is told where others give it.
+    fn points(entries: &Entries, warnings: &mut Vec<ScanWarning>) -> Result<usize, Malformed> {
+        let count = |key: &'static str| match entries.get(key) {
+            Err(_) => Ok(None),
+            Ok((place, _)) => parse_count(place, key, &entries.single(key)?.1).map(Some),
+        };
+        let (points, width, height) = (count("POINTS")?, count("WIDTH")?, count("HEIGHT")?);
+        let mut inferred = |key, value| {
+            warnings.push(ScanWarning::Inferred { key, value });
+            Ok(value)
+        };
+        match (points, width, height) {
+            (Some(points), Some(width), Some(height)) => {
+                if width.checked_mul(height) == Some(points) {
+                    return Ok(points);
+                }
+                let cause = format!("POINTS {points} is not WIDTH {width} times HEIGHT {height}");
+                malformed(entries.get("POINTS")?.0, cause)
+            }
+            (None, Some(width), Some(height)) => match width.checked_mul(height) {
+                Some(points) => inferred("POINTS", points),
+                None => malformed(entries.get("WIDTH")?.0, "more points than any file holds"),
+            },
+            (Some(points), _, None) => {
+                inferred("HEIGHT", 1)?;
+                Ok(points)
+            }
+            (Some(points), None, Some(_)) => {
+                inferred("WIDTH", points)?;
+                Ok(points)
+            }
+            (None, Some(width), None) => inferred("POINTS", width),
+            (None, None, _) => entries.get("POINTS").map(|_| 0),
         }
-        Ok(points)
     }
 
     fn viewpoint(entries: &Entries) -> Result<Option<Isometry3<f64>>, Malformed> {
@@ -281,8 +314,9 @@ fn ascii(bytes: &[u8], header: &Header, parsed: &mut Parsed) -> Result<(), Malfo
         }
         row.clear();
         for token in tokens {
-            row.push(token.parse::<f64>().or_else(|_| {
-                malformed(place, format!("{token:?} is not a number (rows are blank-separated)"))
+            row.push(number(token).ok_or_else(|| Malformed {
+                place,
+                cause: format!("{token:?} is not a number (rows are blank-separated)"),
             })?);
         }
         if row.len() != values {

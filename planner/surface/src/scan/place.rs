@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vec
 use super::crop::CropBox;
 use super::error::ScanError;
 use super::raw::RawScan;
+use super::stray;
 
 /// What is known about where a scan was taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +23,9 @@ pub enum Placement {
         /// Of the support above the floor. \[m\]
         support_height: f64,
     },
-    /// Only the direction against gravity is known: the lowest point rests on the support, the
-    /// points' mean comes to stand over the origin, and no sensor orients the normals.
+    /// Only the direction against gravity is known: the lowest point that has others around it rests
+    /// on the support, the points' mean comes to stand over the origin, and no sensor orients the
+    /// normals.
     Up {
         /// Against gravity, in the file's frame.
         up: UnitVector3<f64>,
@@ -77,7 +79,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
         Placement::Up { up, support_height } => {
             let upright = upright(up);
             let mean = mean(&raw.points, &upright);
-            let lowest = raw.points.iter().map(|p| (upright * p).z).fold(f64::INFINITY, f64::min);
+            let (lowest, _) = stray::support(&raw.points, &upright);
             let shift = Translation3::new(-mean.x, -mean.y, support_height - lowest);
             Isometry3::from_parts(shift, upright)
         }
@@ -96,6 +98,16 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
         sensor,
     };
     (PlacedScan { views: vec![view] }, pose)
+}
+
+/// How many points lie below the one that [`place`] lays onto the support: alone, so that they
+/// carry nothing. Only a placement by [`Placement::Up`] looks for it.
+#[must_use]
+pub fn below_support(raw: &RawScan, placement: &Placement) -> usize {
+    match placement {
+        Placement::Up { up, .. } => stray::support(&raw.points, &upright(up)).1,
+        _ => 0,
+    }
 }
 
 impl PlacedScan {
@@ -206,6 +218,7 @@ mod tests {
         let (placed, _) = place(&scan, &placement);
         assert!((placed.views[0].points[0] - Point3::new(-1.0, -1.0, 0.72)).norm() < 1e-12);
         assert_eq!(placed.views[0].sensor, None);
+        assert_eq!(below_support(&scan, &placement), 0);
         let (_, pose) = place(&scan, &placement);
         let again = place(&scan, &Placement::Frame { pose, sensor: None }).0;
         assert_eq!(again, placed);

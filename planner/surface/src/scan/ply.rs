@@ -5,48 +5,90 @@ use std::io::Cursor;
 use nalgebra::{Point3, Vector3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
-    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
-    ScalarType,
+    Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
+use super::decode::{decode, without_bom};
 use super::error::{Malformed, Place, malformed};
 use super::parsed::Parsed;
-use super::text::without_bom;
+use super::ply_text::Body;
+use super::warning::ScanWarning;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let bytes = without_bom(bytes);
     if bytes.is_empty() {
         return malformed(Place::Line(1), "the file is empty");
     }
-    let mut reader = Reader::new(Cursor::new(bytes));
+    // Comments may be in any encoding, of which the parser wants to know nothing.
+    let mut plain = Vec::new();
+    let mut reader = Reader::new(Cursor::new(match header_end(bytes) {
+        Some(end) if std::str::from_utf8(&bytes[..end]).is_err() => {
+            plain.extend(bytes[..end].iter().map(|&b| if b.is_ascii() { b } else { b'?' }));
+            plain.as_slice()
+        }
+        _ => bytes,
+    }));
     let parser = Parser::<Record>::new();
     let header = parser.read_header(&mut reader).map_err(|e| failure(&e, Place::Line(1)))?;
     let body = usize::try_from(reader.get_ref().position()).unwrap_or(bytes.len());
     check(&header, bytes.len() - body, reader.line())?;
+    let lines_before = reader.line().saturating_sub(1);
+    let mut source = &bytes[body..];
 
     let mut parsed = Parsed::default();
+    let text = match header.encoding {
+        Encoding::Ascii => decode(&bytes[body..], &mut parsed.warnings)?,
+        _ => "".into(),
+    };
+    let mut lines = Body::new(&text, lines_before);
     for (name, definition) in &header.elements {
-        let from = usize::try_from(reader.get_ref().position()).unwrap_or(bytes.len());
-        let records =
-            parser.read_payload_for_element(&mut reader, definition, &header).map_err(|e| {
-                match header.encoding {
-                    Encoding::Ascii => failure(&e, Place::Line(reader.line())),
-                    _ => Malformed { place: Place::Byte(from), cause: one_line(&e) },
+        let has = |names: [&str; 3]| names.iter().all(|n| definition.properties.contains_key(*n));
+        let normal = has(["nx", "ny", "nz"]) || has(["normal_x", "normal_y", "normal_z"]);
+        for _ in 0..definition.count {
+            let place = Place::Byte(bytes.len() - source.len());
+            let binary = |e: ParseError| Malformed { place, cause: one_line(&e) };
+            let record: Record = match header.encoding {
+                Encoding::Ascii => lines.element(definition)?,
+                Encoding::BinaryBigEndian => {
+                    parser.read_big_endian_element(&mut source, definition).map_err(binary)?
                 }
-            })?;
-        match name.as_str() {
-            "vertex" => vertices(definition, &records, &mut parsed),
-            "face" => faces(&records, &mut parsed),
-            _ => {}
+                Encoding::BinaryLittleEndian => {
+                    parser.read_little_endian_element(&mut source, definition).map_err(binary)?
+                }
+            };
+            match name.as_str() {
+                "vertex" => {
+                    parsed.points.push(Point3::from(record.position));
+                    if normal {
+                        parsed.normals.push(Vector3::from(record.normal));
+                    }
+                }
+                "face" => fan(&record.corners, &mut parsed.triangles),
+                _ => {}
+            }
         }
     }
+    if let Some(place) = lines.broken {
+        parsed.warnings.push(ScanWarning::BrokenLines { place });
+    }
+    let end = match header.encoding {
+        Encoding::Ascii => lines.place(),
+        _ => Place::Byte(bytes.len()),
+    };
     // Only now, as faces may stand before the vertices.
     let count = parsed.points.len();
     if let Some(corner) = parsed.triangles.iter().flatten().find(|&&corner| corner >= count) {
         let cause = format!("a face names vertex {corner} of {count}");
-        return malformed(Place::Line(reader.line()), cause);
+        return malformed(end, cause);
     }
     Ok(parsed)
+}
+
+/// Where the header's last line ends. \[byte\]
+fn header_end(bytes: &[u8]) -> Option<usize> {
+    const LAST: &[u8] = b"\nend_header";
+    let at = bytes.windows(LAST.len()).position(|window| window == LAST)? + LAST.len();
+    Some(at + bytes[at..].iter().position(|&b| b == b'\n')? + 1)
 }
 
 /// What is kept of any element; all else is read past.
@@ -63,9 +105,9 @@ impl PropertyAccess for Record {
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
         let slot = match name {
-            "x" => &mut self.position[0],
-            "y" => &mut self.position[1],
-            "z" => &mut self.position[2],
+            "x" | "X" => &mut self.position[0],
+            "y" | "Y" => &mut self.position[1],
+            "z" | "Z" => &mut self.position[2],
             "nx" | "normal_x" => &mut self.normal[0],
             "ny" | "normal_y" => &mut self.normal[1],
             "nz" | "normal_z" => &mut self.normal[2],
@@ -102,7 +144,7 @@ fn check(header: &Header, body: usize, line: usize) -> Result<(), Malformed> {
         return malformed(Place::Line(line), "the header has no vertex element");
     };
     for axis in ["x", "y", "z"] {
-        if !vertex.properties.contains_key(axis) {
+        if !vertex.properties.keys().any(|name| name.eq_ignore_ascii_case(axis)) {
             return malformed(Place::Line(line), format!("vertices have no property {axis}"));
         }
     }
@@ -144,23 +186,10 @@ fn least_size(kind: &PropertyType) -> usize {
     }
 }
 
-fn vertices(definition: &ElementDef, records: &[Record], parsed: &mut Parsed) {
-    parsed.points.extend(records.iter().map(|r| Point3::from(r.position)));
-    let has = |name: &str| definition.properties.contains_key(name);
-    if ["nx", "ny", "nz"].into_iter().all(has)
-        || ["normal_x", "normal_y", "normal_z"].into_iter().all(has)
-    {
-        parsed.normals.extend(records.iter().map(|r| Vector3::from(r.normal)));
-    }
-}
-
 /// Polygons become fans of triangles.
-fn faces(records: &[Record], parsed: &mut Parsed) {
-    for record in records {
-        for pair in record.corners.windows(2).skip(1) {
-            let triangle = [record.corners[0], pair[0], pair[1]];
-            parsed.triangles.push(triangle.map(|corner| corner as usize));
-        }
+fn fan(corners: &[u32], triangles: &mut Vec<[usize; 3]>) {
+    for pair in corners.windows(2).skip(1) {
+        triangles.push([corners[0], pair[0], pair[1]].map(|corner| corner as usize));
     }
 }
 

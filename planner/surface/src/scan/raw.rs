@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, UnitVector3};
 
-use super::error::ScanWarning;
+use super::warning::ScanWarning;
 
 /// Points as the file holds them: finite, scaled to metres, in the file's own frame.
 #[derive(Clone, Debug, PartialEq)]

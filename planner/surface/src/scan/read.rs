@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use nalgebra::{Point3, UnitVector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 
 use super::cloud::MIN_POINTS;
-use super::error::{Malformed, ScanError, ScanWarning};
+use super::error::{Malformed, ScanError};
 use super::parsed::Parsed;
 use super::raw::RawScan;
-use super::{mesh, pcd, ply, sample, text};
+use super::warning::ScanWarning;
+use super::{decode, foreign, mesh, pcd, ply, sample, stray, text, winding};
 
 /// How to read a scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +39,7 @@ pub enum Format {
     Stl,
     /// Wavefront mesh or points.
     Obj,
-    /// Three or six numbers a line, separated by blanks, commas or semicolons.
+    /// A point a line: numbers apart by blanks, tabs, commas or semicolons, columns named or not.
     Text,
 }
 
@@ -54,7 +55,7 @@ impl Format {
             Some("obj") => Some(Self::Obj),
             Some("xyz" | "csv" | "txt" | "asc" | "pts") => Some(Self::Text),
             _ => {
-                let head = text::without_bom(bytes);
+                let head = decode::without_bom(bytes);
                 if head.starts_with(b"ply") {
                     Some(Self::Ply)
                 } else if head.starts_with(b"# .PCD") || head.starts_with(b"VERSION") {
@@ -77,8 +78,12 @@ const METRE_EXTENT: f64 = 30.0;
 pub fn read(path: &Path, options: &ReadOptions) -> Result<RawScan, ScanError> {
     let bytes =
         std::fs::read(path).map_err(|source| ScanError::Io { path: path.into(), source })?;
-    let format = Format::detect(path, &bytes)
-        .ok_or_else(|| ScanError::UnknownFormat { path: path.into() })?;
+    let Some(format) = Format::detect(path, &bytes) else {
+        return Err(match foreign::detect(path, &bytes) {
+            Some((format, convert)) => ScanError::Foreign { path: path.into(), format, convert },
+            None => ScanError::UnknownFormat { path: path.into() },
+        });
+    };
     read_bytes(&bytes, format, path, options)
 }
 
@@ -109,28 +114,38 @@ pub fn read_bytes(
 
 fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan, ScanError> {
     let Parsed { mut points, mut normals, triangles, mut viewpoint, mut warnings } = parsed;
+    let scale = scale(options.scale, &mut warnings);
     for p in &mut points {
-        p.coords *= options.scale;
+        p.coords *= scale;
     }
     if let Some(pose) = &mut viewpoint {
-        pose.translation.vector *= options.scale;
+        pose.translation.vector *= scale;
     }
     let mut dropped = 0;
     if !triangles.is_empty() {
+        let wound = winding::outward(&points, triangles, &mut warnings);
         (points, normals, dropped) =
-            sample::sample(&points, &triangles, options.mesh_spacing, options.seed, &mut warnings);
+            sample::sample(&points, &wound, options.mesh_spacing, options.seed, &mut warnings);
     }
     let finite: Vec<bool> = points.iter().map(|p| p.coords.iter().all(|c| c.is_finite())).collect();
-    let kept_normals: Vec<Option<UnitVector3<f64>>> = normals
-        .iter()
-        .zip(&finite)
-        .filter(|(_, keep)| **keep)
-        .map(|(n, _)| UnitVector3::try_new(*n, 1e-6).filter(|n| n.iter().all(|c| c.is_finite())))
-        .collect();
-    let total = points.len();
-    let mut keep = finite.iter();
-    points.retain(|_| *keep.next().unwrap_or(&false));
-    dropped += total - points.len();
+    dropped += keep(&mut points, &mut normals, &finite);
+
+    let zero = |p: &Point3<f64>| p.coords.iter().all(|c| *c == 0.0);
+    let zeros = points.iter().filter(|p| zero(p)).count();
+    if zeros >= MIN_POINTS && zeros < points.len() {
+        let seen: Vec<bool> = points.iter().map(|p| !zero(p)).collect();
+        keep(&mut points, &mut normals, &seen);
+        warnings.push(ScanWarning::AtOrigin { dropped: zeros });
+    }
+    if let Some(strays) = stray::find(&points) {
+        let near: Vec<bool> = strays.flags.iter().map(|stray| !stray).collect();
+        keep(&mut points, &mut normals, &near);
+        warnings.push(ScanWarning::Stray {
+            dropped: strays.count,
+            farthest: strays.farthest.into(),
+            distance: strays.distance,
+        });
+    }
 
     if points.len() < MIN_POINTS {
         let path = path.into();
@@ -148,10 +163,33 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     }
     // A single missing normal makes the file's normals unusable as a whole: a mixture of given
     // and estimated ones would not be oriented alike.
-    let normals = (kept_normals.len() == points.len())
-        .then(|| kept_normals.into_iter().collect::<Option<Vec<_>>>())
+    let unit =
+        |n: Vector3<f64>| UnitVector3::try_new(n, 1e-6).filter(|n| n.iter().all(|c| c.is_finite()));
+    let normals = (normals.len() == points.len())
+        .then(|| normals.into_iter().map(unit).collect::<Option<Vec<_>>>())
         .flatten();
     Ok(RawScan { points, normals, viewpoint, dropped, warnings })
+}
+
+/// The factor to metres: the user's, else 1, as what the columns say is in the points by now.
+fn scale(asked: f64, warnings: &mut Vec<ScanWarning>) -> f64 {
+    let stated = warnings.iter().position(|w| matches!(w, ScanWarning::Unit { .. }));
+    let Some(at) = stated.filter(|_| asked != 1.0) else { return asked };
+    let ScanWarning::Unit { unit, factor } = warnings.remove(at) else { return asked };
+    warnings.push(ScanWarning::UnitOverruled { unit, scale: asked });
+    asked / factor
+}
+
+/// Keeps what is flagged of the points and their normals; returns how many points went.
+fn keep(points: &mut Vec<Point3<f64>>, normals: &mut Vec<Vector3<f64>>, flags: &[bool]) -> usize {
+    let before = points.len();
+    if normals.len() == before {
+        let mut flag = flags.iter();
+        normals.retain(|_| *flag.next().unwrap_or(&false));
+    }
+    let mut flag = flags.iter();
+    points.retain(|_| *flag.next().unwrap_or(&false));
+    before - points.len()
 }
 
 /// The longest side of the bounding box.

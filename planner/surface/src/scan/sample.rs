@@ -4,25 +4,26 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::error::ScanWarning;
+use super::warning::ScanWarning;
+use super::winding::Wound;
 
 /// Most points sampled on one mesh; cleaning keeps a fifth of them.
 pub(super) const MAX_SAMPLES: f64 = 300_000.0;
 
-/// Points with normals, spread evenly at random over the faces: `1 / spacing²` for each square
-/// metre. Returns also how many faces were dropped as not finite.
+/// Points with outward normals, spread evenly at random over the faces: `1 / spacing²` for each
+/// square metre. Returns also how many faces were dropped as not finite.
 pub(super) fn sample(
     vertices: &[Point3<f64>],
-    triangles: &[[usize; 3]],
+    wound: &Wound,
     spacing: f64,
     seed: u64,
     warnings: &mut Vec<ScanWarning>,
 ) -> (Vec<Point3<f64>>, Vec<Vector3<f64>>, usize) {
-    let mut faces = Vec::with_capacity(triangles.len());
-    let mut cumulative = Vec::with_capacity(triangles.len());
+    let mut faces = Vec::with_capacity(wound.triangles.len());
+    let mut cumulative = Vec::with_capacity(wound.triangles.len());
     let mut area = 0.0;
     let mut dropped = 0;
-    for corners in triangles {
+    for (corners, turned) in wound.triangles.iter().zip(&wound.turned) {
         let [a, b, c] = corners.map(|corner| vertices[corner]);
         let twice = (b - a).cross(&(c - a));
         let norm = twice.norm();
@@ -30,7 +31,8 @@ pub(super) fn sample(
             dropped += 1;
         } else if norm > 0.0 {
             area += 0.5 * norm;
-            faces.push((a, b - a, c - a, twice / norm));
+            let outward = if *turned { -norm } else { norm };
+            faces.push((a, b - a, c - a, twice / outward));
             cumulative.push(area);
         }
     }

@@ -24,6 +24,14 @@ pub fn chair(seed: u64) -> SimulatedView {
     Kinect::default().view(&shape::chair(), eye, Point3::new(0.03, 0.0, 0.45), seed)
 }
 
+/// The chair as [`chair`] sees it, and from 0.3 m beside that.
+#[must_use]
+pub fn chair_twice(seed: u64) -> [SimulatedView; 2] {
+    let beside = Point3::new(-0.68, 0.08, SENSOR_HEIGHT);
+    let at = Point3::new(0.03, 0.0, 0.45);
+    [chair(seed), Kinect::default().view(&shape::chair(), beside, at, seed + 1)]
+}
+
 /// A ride-on toy car of 0.62 m length, its side towards the sensor.
 #[must_use]
 pub fn bobby_car(seed: u64) -> SimulatedView {

@@ -1,0 +1,147 @@
+//! What stands in a scanned room, and one object of it as the surface to sweep.
+
+use std::str::FromStr;
+
+use anyhow::bail;
+use nalgebra::{Point3, Translation3, UnitVector3, Vector3};
+use nullsweep_collision::Obstacle;
+use nullsweep_planner::progress::Progress;
+use nullsweep_planner::workcell::Scene;
+use nullsweep_robot::Geometry;
+use nullsweep_surface::room::{self, Level, Plane, PlaneKind, Room};
+use nullsweep_surface::{CleanConfig, PlacedScan, RawScan, scan};
+
+use crate::bars::Bars;
+
+/// Thickness of a table top. [m]
+pub(super) const TABLE_TOP: f64 = 0.03;
+
+/// A level plane this near to height 0 is the floor that every scene has. [m]
+const FLOOR: f64 = 0.08;
+
+/// Which object of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ObjectChoice {
+    /// The one with the most points.
+    Largest,
+    /// By its number, from 1 on.
+    Number(usize),
+}
+
+impl FromStr for ObjectChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            Ok(0) => Err("objects are numbered from 1 on".into()),
+            Ok(number) => Ok(Self::Number(number)),
+            Err(_) if text == "largest" => Ok(Self::Largest),
+            Err(_) => Err("a number or `largest` is wanted".into()),
+        }
+    }
+}
+
+/// Gravity by a scan's largest level plane.
+pub(super) fn level(
+    raw: &RawScan,
+    up: Option<UnitVector3<f64>>,
+    seed: u64,
+) -> anyhow::Result<Level> {
+    let found = room::level(raw, up, seed)?;
+    // Who says the direction says it exactly; the plane gives the height.
+    Ok(Level { up: up.unwrap_or(found.up), ..found })
+}
+
+/// The chosen object as the surface to sweep; all else that was scanned is in the way, floor, tables
+/// and walls as far as they were seen. Second, the flying pixels.
+pub(super) fn object(
+    scan: &PlacedScan,
+    choice: ObjectChoice,
+    seed: u64,
+    bars: &Bars,
+) -> anyhow::Result<(Scene, Vec<Point3<f64>>)> {
+    let room = Room::find(scan, seed);
+    let count = room.segments.len();
+    let index = match choice {
+        ObjectChoice::Largest => 0,
+        ObjectChoice::Number(number) => number - 1,
+    };
+    let Some(segment) = room.segments.get(index) else {
+        if count == 0 {
+            bail!(
+                "no object stands on the {} planes of the scene: look with `planner scene`, or cut \
+                 out with --crop what is to be swept",
+                room.planes.len()
+            );
+        }
+        bail!("there is no object {}: `planner scene` shows {count}", index + 1);
+    };
+    let (low, high) = (segment.bounds.min, segment.bounds.max);
+    bars.note(&format!(
+        "object {} of {count}: {} points from {low:.2} to {high:.2} m, on the {}; {} planes are \
+         obstacles as far as they were seen",
+        index + 1,
+        segment.points,
+        name(room.planes[segment.stands_on].kind),
+        room.planes.len()
+    ));
+    let (surface, _) = scan::clean(&segment.split(scan).0, &CleanConfig::default())?;
+    let (mut scene, flying) = Scene::around(surface, scan);
+    scene.surroundings.retain(|point| !room.is_on_plane(point));
+    scene.obstacles.extend(room.planes.iter().filter_map(obstacle));
+    Ok((scene, flying))
+}
+
+/// What a plane is called.
+pub(super) fn name(kind: PlaneKind) -> &'static str {
+    match kind {
+        PlaneKind::Floor => "floor",
+        PlaneKind::Table => "table",
+        PlaneKind::Wall => "wall",
+    }
+}
+
+/// A plate as large as a plane was seen, on the plane's far side; none for the floor itself.
+fn obstacle(plane: &Plane) -> Option<Obstacle> {
+    if plane.kind == PlaneKind::Floor && plane.point.z.abs() < FLOOR {
+        return None;
+    }
+    let rectangle = plane.rectangle();
+    let half = 0.5 * TABLE_TOP;
+    let [x, y] = rectangle.half;
+    Some(Obstacle {
+        name: name(plane.kind).into(),
+        shape: Geometry::Box { half_extents: Vector3::new(x, y, half) }.into(),
+        pose: rectangle.pose * Translation3::new(0.0, 0.0, -half),
+        carries_robot: false,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plate_reaches_as_far_as_the_plane_was_seen_and_not_above_it() {
+        let corner = |x: f64, y: f64| Point3::new(x, y, 0.7);
+        let plane = Plane {
+            point: corner(0.1, 0.0),
+            normal: Vector3::z_axis(),
+            outline: vec![corner(0.0, -1.0), corner(0.5, -1.0), corner(0.5, 1.0), corner(0.0, 1.0)],
+            area: 1.0,
+            kind: PlaneKind::Table,
+        };
+        let plate = obstacle(&plane).expect("a table is an obstacle");
+        let nullsweep_collision::ObstacleShape::Geometry(Geometry::Box { half_extents }) =
+            plate.shape
+        else {
+            panic!("a plate is a box");
+        };
+        let middle = plate.pose * Point3::origin();
+        assert!((middle - Point3::new(0.25, 0.0, 0.7 - 0.5 * TABLE_TOP)).norm() < 1e-9);
+        let reach = plate.pose.rotation * half_extents;
+        assert!((reach.abs() - Vector3::new(0.25, 1.0, 0.5 * TABLE_TOP)).norm() < 1e-9);
+        let floor = Plane { kind: PlaneKind::Floor, point: Point3::origin(), ..plane };
+        assert!(obstacle(&floor).is_none(), "every scene has a floor by itself");
+    }
+}

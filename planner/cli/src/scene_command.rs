@@ -1,0 +1,186 @@
+//! `planner scene`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nalgebra::Point3;
+use nullsweep_planner::progress::Progress;
+use nullsweep_report::{self as report, RoomData};
+use nullsweep_surface::PlacedScan;
+use nullsweep_surface::room::Room;
+use serde::Serialize;
+
+use crate::bars::Bars;
+use crate::exit::OK;
+use crate::room::name;
+use crate::scene::{Gravity, SceneArgs, read_scans};
+
+#[derive(Debug, Args)]
+pub(super) struct SceneCommandArgs {
+    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ.
+    #[arg(required = true)]
+    scans: Vec<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Seed of every random choice: the same seed finds the same planes and objects.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Write planes and objects as TOML to a file.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write a page with a picture of planes and objects.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
+    let bars = Bars::new();
+    bars.stage("scan", None);
+    let scan = read_scans(&args.scene, &args.scans, args.seed, Gravity::Found, &bars)?;
+    bars.stage("planes and objects", None);
+    let room = Room::find(&scan, args.seed);
+    bars.clear();
+    let rows = rows(&room);
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED).set_header(COLUMNS);
+    table.add_rows(&rows);
+    println!("{table}");
+    if let Some(path) = &args.out {
+        let text = toml::to_string(&file(&args.scans, &scan, &room))?;
+        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        println!("scene: {}", path.display());
+    }
+    if let Some(path) = &args.report {
+        report::write_room(path, &picture(&args.scans, &scan, &room, rows))?;
+        println!("report: {}", path.display());
+    }
+    Ok(OK)
+}
+
+const COLUMNS: [&str; 5] = ["", "points or m\u{b2}", "from [m]", "to [m]", "stands on"];
+
+/// Planes, then objects, for people.
+fn rows(room: &Room) -> Vec<Vec<String>> {
+    let corner = |p: &Point3<f64>| format!("{:.2}, {:.2}, {:.2}", p.x, p.y, p.z);
+    let planes = room.planes.iter().enumerate().map(|(i, plane)| {
+        let first = plane.outline.first().copied().unwrap_or(plane.point);
+        let (low, high) =
+            plane.outline.iter().fold((first, first), |(l, h), p| (l.inf(p), h.sup(p)));
+        vec![
+            format!("plane {}: {}", i + 1, name(plane.kind)),
+            format!("{:.2} m\u{b2}", plane.area),
+            corner(&low),
+            corner(&high),
+            String::new(),
+        ]
+    });
+    let objects = room.segments.iter().enumerate().map(|(i, segment)| {
+        vec![
+            format!("object {}", i + 1),
+            segment.points.to_string(),
+            corner(&segment.bounds.min),
+            corner(&segment.bounds.max),
+            format!("plane {}", segment.stands_on + 1),
+        ]
+    });
+    planes.chain(objects).collect()
+}
+
+/// A scene file: all in the floor frame, in metres.
+#[derive(Serialize)]
+struct SceneFile {
+    scan: Vec<ScanEntry>,
+    plane: Vec<PlaneEntry>,
+    object: Vec<ObjectEntry>,
+}
+
+#[derive(Serialize)]
+struct ScanEntry {
+    file: PathBuf,
+    points: usize,
+    /// Where its sensor stood, if that is known.
+    sensor: Option<[f64; 3]>,
+}
+
+#[derive(Serialize)]
+struct PlaneEntry {
+    number: usize,
+    kind: &'static str,
+    point: [f64; 3],
+    normal: [f64; 3],
+    area: f64,
+    outline: Vec<[f64; 3]>,
+}
+
+#[derive(Serialize)]
+struct ObjectEntry {
+    number: usize,
+    points: usize,
+    min: [f64; 3],
+    max: [f64; 3],
+    centre: [f64; 3],
+    stands_on: usize,
+}
+
+fn file(scans: &[PathBuf], scan: &PlacedScan, room: &Room) -> SceneFile {
+    let scan = scans.iter().zip(&scan.views).map(|(file, view)| ScanEntry {
+        file: file.clone(),
+        points: view.points.len(),
+        sensor: view.sensor.map(Into::into),
+    });
+    let plane = room.planes.iter().enumerate().map(|(i, plane)| PlaneEntry {
+        number: i + 1,
+        kind: name(plane.kind),
+        point: plane.point.into(),
+        normal: plane.normal.into_inner().into(),
+        area: plane.area,
+        outline: plane.outline.iter().map(|p| (*p).into()).collect(),
+    });
+    let object = room.segments.iter().enumerate().map(|(i, segment)| ObjectEntry {
+        number: i + 1,
+        points: segment.points,
+        min: segment.bounds.min.into(),
+        max: segment.bounds.max.into(),
+        centre: segment.centre.into(),
+        stands_on: segment.stands_on + 1,
+    });
+    SceneFile { scan: scan.collect(), plane: plane.collect(), object: object.collect() }
+}
+
+fn picture(scans: &[PathBuf], scan: &PlacedScan, room: &Room, rows: Vec<Vec<String>>) -> RoomData {
+    let mut taken: Vec<Vec<bool>> =
+        scan.views.iter().map(|view| vec![false; view.points.len()]).collect();
+    let mut clouds = Vec::new();
+    for (i, segment) in room.segments.iter().enumerate() {
+        let mut points = Vec::with_capacity(segment.points);
+        for (v, members) in segment.members.iter().enumerate() {
+            for &member in members {
+                points.push(scan.views[v].points[member as usize]);
+                taken[v][member as usize] = true;
+            }
+        }
+        clouds.push((format!("object {}", i + 1), points));
+    }
+    let all = scan.views.iter().zip(&taken).flat_map(|(view, taken)| view.points.iter().zip(taken));
+    let rest = all.filter(|(_, taken)| !**taken).map(|(point, _)| *point);
+    clouds.push(("planes and all else".into(), rest.collect()));
+    let outline = |(i, plane): (usize, &nullsweep_surface::room::Plane)| {
+        (format!("plane {}: {}", i + 1, name(plane.kind)), plane.outline.clone())
+    };
+    let files: Vec<String> =
+        scans.iter().map(|path| Path::new(path).display().to_string()).collect();
+    RoomData {
+        title: "Nullsweep scene".into(),
+        subtitle: files.join(", "),
+        tables: vec![report::Table {
+            title: "Planes and objects".into(),
+            columns: COLUMNS.map(Into::into).into(),
+            rows,
+        }],
+        clouds,
+        outlines: room.planes.iter().enumerate().map(outline).collect(),
+    }
+}

@@ -1,0 +1,73 @@
+//! Formats that are known but not read, and how to get from them to one that is.
+
+use std::path::Path;
+
+/// A format's name, how its files end and begin, and a command that converts one.
+struct Foreign {
+    name: &'static str,
+    extensions: &'static [&'static str],
+    begins: &'static [u8],
+    convert: &'static str,
+}
+
+const FOREIGN: [Foreign; 8] = [
+    Foreign {
+        name: "LAS/LAZ",
+        extensions: &["las", "laz"],
+        begins: b"LASF",
+        convert: "pdal translate FILE out.ply",
+    },
+    Foreign {
+        name: "E57",
+        extensions: &["e57"],
+        begins: b"ASTM-E57",
+        convert: "pdal translate FILE out.ply",
+    },
+    Foreign {
+        name: "glTF",
+        extensions: &["gltf", "glb"],
+        begins: b"glTF",
+        convert: "assimp export FILE out.ply",
+    },
+    Foreign {
+        name: "3MF",
+        extensions: &["3mf"],
+        begins: b"PK\x03\x04",
+        convert: "assimp export FILE out.stl",
+    },
+    Foreign {
+        name: "NumPy",
+        extensions: &["npy", "npz"],
+        begins: b"\x93NUMPY",
+        convert: "python3 -c \"import numpy as n; n.savetxt('out.xyz', n.load('FILE').reshape(-1, 3))\"",
+    },
+    Foreign {
+        name: "PTX",
+        extensions: &["ptx"],
+        begins: b"",
+        convert: "CloudCompare -SILENT -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS",
+    },
+    Foreign {
+        name: "DAE, FBX or 3DS mesh",
+        extensions: &["dae", "fbx", "3ds"],
+        begins: b"Kaydara FBX",
+        convert: "assimp export FILE out.ply",
+    },
+    Foreign {
+        name: "ROS bag",
+        extensions: &["bag", "mcap", "db3"],
+        begins: b"#ROSBAG",
+        convert: "ros2 run pcl_ros bag_to_pcd FILE TOPIC .",
+    },
+];
+
+/// The name of a known format that is not read, and the command that converts this file.
+pub(super) fn detect(path: &Path, bytes: &[u8]) -> Option<(&'static str, String)> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let is = |f: &&Foreign| {
+        f.extensions.contains(&extension.as_str())
+            || (!f.begins.is_empty() && bytes.starts_with(f.begins))
+    };
+    let foreign = FOREIGN.iter().find(is)?;
+    Some((foreign.name, foreign.convert.replace("FILE", &path.display().to_string())))
+}
