@@ -15,6 +15,7 @@ mod error;
 mod node;
 mod owner;
 mod plan;
+mod spoilt;
 mod stream;
 
 use crate::service;
