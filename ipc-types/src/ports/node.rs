@@ -94,6 +94,12 @@ impl Ipc {
         self.root.as_deref()
     }
 
+    /// What the names of this system's files in `/dev/shm` begin with.
+    #[must_use]
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
     /// Removes what processes that died left behind; how many were swept. A sweep takes
     /// milliseconds and makes system calls: keep it off the real-time thread.
     pub fn sweep_dead_nodes(&self) -> u64 {
@@ -149,8 +155,11 @@ fn no_number(what: &str, root: Option<&Path>, prefix: &str, detail: String) -> I
     }
 }
 
-/// Does something in a thread of its own, which is left behind where it takes longer.
-fn within<T: Send + 'static>(
+/// Does something in a thread of its own, which is left behind where it takes longer than `limit`.
+///
+/// # Errors
+/// [`io::ErrorKind::TimedOut`] then, or what keeps the thread from being started.
+pub fn within<T: Send + 'static>(
     limit: Duration,
     make: impl FnOnce() -> T + Send + 'static,
 ) -> io::Result<T> {
