@@ -120,14 +120,16 @@ class PlanHeader(ctypes.Structure):
         ("interpolation", ctypes.c_uint32),
         ("join_rule", ctypes.c_uint32),
         ("join_knot", ctypes.c_uint32),
+        ("corners", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
     ]
 
     @staticmethod
     def type_name():
-        return "nullsweep.PlanHeader.v1"
+        return "nullsweep.PlanHeader.v2"
 
 
-assert ctypes.sizeof(PlanHeader) == 392
+assert ctypes.sizeof(PlanHeader) == 400
 
 
 class Setpoint(ctypes.Structure):
@@ -305,6 +307,8 @@ class Reason(enum.IntEnum):
     ACCELERATION = 19
     REPEATED = 20
     GOAL = 21
+    CORNER = 22
+    JERK = 23
 
 
 _TEXTS[EventKind] = {
@@ -337,6 +341,8 @@ _TEXTS[Reason] = {
     Reason.ACCELERATION: "above the acceleration limit",
     Reason.REPEATED: "a plan of this id came before",
     Reason.GOAL: "the arm did not come to rest at the plan's end",
+    Reason.CORNER: "a corner that the plan does not ask for",
+    Reason.JERK: "above the jerk limit",
 }
 
 

@@ -44,7 +44,7 @@ pub use driver::Driver;
 pub use executor::{Config, ExecutorError, Summary, quantile_ns, run};
 pub use guard::{Guard, JointGuard};
 pub use hardware::{Hardware, IpcHardware, Loopback};
-pub use interpolate::{PlanKnot, Sample, reach, sample, top_acceleration, top_speed};
+pub use interpolate::{PlanKnot, Sample, reach, sample, top_acceleration, top_jerk, top_speed};
 pub use nullsweep_robot::{JointVector, MAX_DOF};
 pub use path::{Path, Progress};
 pub use record::{ReplayError, Replayed, replay};

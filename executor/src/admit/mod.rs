@@ -4,6 +4,8 @@
 //! moment (where the arm holds, whether the knot to join has passed) is judged later by the
 //! loop, in [`crate::cycle`].
 
+mod motion;
+
 use core::fmt;
 
 use nullsweep_ipc_types::{
@@ -12,18 +14,13 @@ use nullsweep_ipc_types::{
 };
 
 use crate::guard::Guard;
-use crate::interpolate::{PlanKnot, reach, top_acceleration, top_speed};
+use crate::interpolate::{PlanKnot, top_speed};
 use crate::total::{greater, within};
 use crate::{JointVector, MAX_DOF};
+use motion::{check_corners, check_end, check_segments};
 
 /// Plan times are whole nanoseconds in an `f64`. \[ns\]
 const LONGEST_NS: u64 = 1 << 53;
-/// A planner rounds its times to whole nanoseconds, so a segment may be this much too short. \[s\]
-const ROUNDING_S: f64 = 1e-9;
-/// What a planner's acceleration may exceed its limit by, as a share of it.
-const ROUNDING_SHARE: f64 = 1e-6;
-/// Room for the rounding of positions. \[rad\]
-const SLACK: f64 = 1e-9;
 /// The rate of plan time never changes faster than from 0 to 1 in 20 ms, nor slower than in 1 s.
 const RAMP: (f64, f64) = (1.0, 50.0);
 
@@ -43,13 +40,22 @@ pub enum Join {
     },
 }
 
+/// What a plan does between its knots, and in them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shape {
+    /// How to move between knots.
+    pub(crate) interpolation: Interpolation,
+    /// Whether a linear plan's velocity may step in every knot.
+    pub(crate) corners: bool,
+}
+
 /// A plan that has passed every check that does not depend on the moment. Its fields are
 /// private and nothing changes it, so the loop need not look again.
 #[derive(Debug, PartialEq)]
 pub struct ValidPlan {
     id: PlanId,
     join: Join,
-    interpolation: Interpolation,
+    shape: Shape,
     knots: Vec<PlanKnot>,
     /// The knots' times once more, close together, to be searched.
     times: Vec<f64>,
@@ -61,12 +67,12 @@ impl ValidPlan {
     pub(crate) fn new(
         id: PlanId,
         join: Join,
-        interpolation: Interpolation,
+        shape: Shape,
         knots: Vec<PlanKnot>,
         waited: f64,
     ) -> Self {
         let times = knots.iter().map(|k| k.time).collect();
-        Self { id, join, interpolation, knots, times, waited }
+        Self { id, join, shape, knots, times, waited }
     }
 
     /// The time from its publication to the end of its check, which the loop tells with its
@@ -97,7 +103,13 @@ impl ValidPlan {
     /// How to move between knots.
     #[must_use]
     pub fn interpolation(&self) -> Interpolation {
-        self.interpolation
+        self.shape.interpolation
+    }
+
+    /// Whether its velocity may step in every knot, the first and the last one too: bang-bang.
+    #[must_use]
+    pub fn has_corners(&self) -> bool {
+        self.shape.corners
     }
 
     /// At least two knots, times from 0 and rising strictly.
@@ -209,7 +221,8 @@ impl Rules {
 ///
 /// # Errors
 /// The first rule that it breaks, in this order: counts and enum values, checksum, epoch, robot,
-/// held joints, finite values, time order, soft limits, velocity and acceleration, rest at the end.
+/// held joints, finite values, time order, soft limits, velocity, acceleration and jerk, rest at the
+/// end, corners.
 pub fn admit(
     header: &PlanHeader,
     knots: &[Knot],
@@ -217,7 +230,7 @@ pub fn admit(
     rules: &Rules,
     now_ns: u64,
 ) -> Result<ValidPlan, Rejection> {
-    let (interpolation, join) = shape(header, knots)?;
+    let (shape, join) = shape(header, knots)?;
     if checksum(PlanMessage { header, knots }) != header.checksum {
         return Err(Rejection::new(Reason::Checksum));
     }
@@ -233,15 +246,16 @@ pub fn admit(
         return Err(Rejection::new(Reason::Robot).value(value, bound));
     }
     check_held(header, held, rules)?;
-    let mut plan = ValidPlan::new(header.id, join, interpolation, read(knots, joints)?, 0.0);
-    check_motion(&plan, &rules.guard)?;
+    let mut plan = ValidPlan::new(header.id, join, shape, read(knots, joints)?, 0.0);
+    check_segments(&plan, &rules.guard)?;
     check_end(&plan, &rules.guard)?;
+    check_corners(&plan, &rules.guard)?;
     set_ramps(&mut plan, &rules.guard);
     Ok(plan)
 }
 
 /// Counts and enum values.
-fn shape(header: &PlanHeader, knots: &[Knot]) -> Result<(Interpolation, Join), Rejection> {
+fn shape(header: &PlanHeader, knots: &[Knot]) -> Result<(Shape, Join), Rejection> {
     let malformed = Rejection::new(Reason::Malformed);
     if !(2..=MAX_KNOTS).contains(&knots.len()) {
         return Err(malformed.value(knots.len() as f64, MAX_KNOTS as f64));
@@ -264,7 +278,8 @@ fn shape(header: &PlanHeader, knots: &[Knot]) -> Result<(Interpolation, Join), R
         JoinRule::AfterCurrent => Join::After,
         JoinRule::AtKnot => Join::Knot { plan: header.join_plan, knot: header.join_knot as usize },
     };
-    Ok((interpolation, join))
+    let corners = header.corners != 0 && interpolation == Interpolation::Linear;
+    Ok((Shape { interpolation, corners }, join))
 }
 
 fn check_held(header: &PlanHeader, held: Option<&Held>, rules: &Rules) -> Result<(), Rejection> {
@@ -332,52 +347,6 @@ fn read(knots: &[Knot], joints: usize) -> Result<Vec<PlanKnot>, Rejection> {
     Ok(read)
 }
 
-/// Soft limits with the braking margin at each segment's speed, velocity limits, and acceleration
-/// limits within curves. A straight segment's corners are bang-bang, and that is allowed.
-fn check_motion(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
-    for (i, pair) in plan.knots.windows(2).enumerate() {
-        let (a, b) = (&pair[0], &pair[1]);
-        let seconds = (b.time - a.time) * 1e-9;
-        for (j, bound) in guard.used().iter().enumerate() {
-            let speed = top_speed(a, b, plan.interpolation, j);
-            let fits = speed * seconds <= bound.velocity() * (seconds + ROUNDING_S) + SLACK;
-            let (low, high) = reach(a, b, plan.interpolation, j);
-            let (lower, upper) = bound.limits_at(speed);
-            let at = |reason| Rejection::new(reason).knot(i + 1).joint(j);
-            // Written so that NaN breaks every rule.
-            if !(low >= lower - SLACK) {
-                return Err(at(Reason::SoftLimit).value(low, lower));
-            }
-            if !(high <= upper + SLACK) {
-                return Err(at(Reason::SoftLimit).value(high, upper));
-            }
-            if !fits {
-                return Err(at(Reason::Velocity).value(speed, bound.velocity()));
-            }
-            let (hardest, most) =
-                (top_acceleration(a, b, plan.interpolation, j), bound.limits.acceleration);
-            if !(hardest <= most * (1.0 + ROUNDING_SHARE) + SLACK) {
-                return Err(at(Reason::Acceleration).value(hardest, most));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// A curve must come to rest: after its last knot the arm holds.
-fn check_end(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
-    let Some(last) = plan.knots.last().filter(|_| plan.interpolation == Interpolation::Cubic)
-    else {
-        return Ok(());
-    };
-    guard.matches_velocity(&last.v, &JointVector::ZERO).map_err(|(joint, speed)| {
-        Rejection::new(Reason::Velocity)
-            .knot(plan.knots.len() - 1)
-            .joint(joint)
-            .value(speed, guard.velocity_tolerance(joint))
-    })
-}
-
 /// Gives each knot the steepest change of rate that is safe from its segment to one cycle past
 /// it, so that the loop need not look ahead. A sliding minimum, from the end.
 fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
@@ -387,7 +356,7 @@ fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
         .windows(2)
         .map(|pair| {
             let top = (0..guard.dof)
-                .map(|j| top_speed(&pair[0], &pair[1], plan.interpolation, j))
+                .map(|j| top_speed(&pair[0], &pair[1], plan.interpolation(), j))
                 .fold(0.0, greater);
             within(guard.stop_acceleration / top, RAMP.0, RAMP.1)
         })

@@ -149,6 +149,7 @@ impl System {
             fingerprint: self.arm.fingerprint(),
             joint_count: self.arm.dof() as u32,
             held_count: held.len() as u32,
+            corners: 1,
             ..PlanHeader::default()
         };
         for (to, joint) in header.held_positions.iter_mut().zip(held) {
