@@ -246,6 +246,7 @@ class Telemetry(ctypes.Structure):
         ("stamp_ns", ctypes.c_uint64),
         ("cycle", ctypes.c_uint64),
         ("missed_cycles", ctypes.c_uint64),
+        ("lost_lines", ctypes.c_uint64),
         ("plan", PlanId),
         ("plan_time_ns", ctypes.c_uint64),
         ("speed_scale", ctypes.c_double),
@@ -262,10 +263,10 @@ class Telemetry(ctypes.Structure):
 
     @staticmethod
     def type_name():
-        return "nullsweep.Telemetry.v2"
+        return "nullsweep.Telemetry.v3"
 
 
-assert ctypes.sizeof(Telemetry) == 720
+assert ctypes.sizeof(Telemetry) == 728
 
 
 class EventKind(enum.IntEnum):

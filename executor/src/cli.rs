@@ -1,9 +1,11 @@
 //! The command line: `executor run`, `executor replay`; `executor ctl` is next door.
 
 use std::ffi::OsString;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand};
@@ -145,29 +147,16 @@ where
 }
 
 fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {
-    let log = Log::to_stderr();
-    let line = log.line();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
-    // Another subscriber may be there where this runs inside another program.
-    let _ = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_target(false)
-        .with_ansi(std::io::stderr().is_terminal())
-        .log_internal_errors(false)
-        .with_writer(move || line.clone())
-        .try_init();
-    // The usual one writes to standard error itself, which may hang.
-    std::panic::set_hook(Box::new(|panic| tracing::error!("{panic}")));
-    let result = run_logged(args);
+    let log = Log::install("info");
+    let result = run_logged(args, log.lost());
     log.end();
     result
 }
 
-fn run_logged(args: &RunArgs) -> anyhow::Result<ExitCode> {
+fn run_logged(args: &RunArgs, lost_lines: Arc<AtomicU64>) -> anyhow::Result<ExitCode> {
     let alarm = Alarm::install()?;
     let arm = arm(args)?;
-    let config = config(args, &arm)?;
+    let config = Config { lost_lines, ..config(args, &arm)? };
     tracing::info!(
         "executor for robot `{}`: {} joints from {} to {}, {} Hz, process {}",
         config.robot_name,
@@ -256,6 +245,7 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         cpu: args.cpu,
         spin_ns: u64::from(spin_us) * 1000,
         record: args.record.clone().map(|folder| (folder, args.record_mib << 20)),
+        lost_lines: Arc::default(),
     })
 }
 

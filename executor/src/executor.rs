@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -56,6 +56,8 @@ pub struct Config {
     pub spin_ns: u64,
     /// Folder of the flight recorder, and the size of each of its two files. \[bytes\]
     pub record: Option<(PathBuf, u64)>,
+    /// Lines of the log that were lost, as whoever writes it counts them; told in telemetry.
+    pub lost_lines: Arc<AtomicU64>,
 }
 
 /// Why an executor could not start or run to a clean end.
@@ -162,7 +164,8 @@ pub fn run(arm: &Arm, config: &Config, alarm: &Alarm) -> Result<Summary, Executo
         rt::raise(helper_priority(config));
         let ipc = open(config)?;
         let journal = Journal::new(Words::of(&own, &config.robot_name, &config.guard));
-        let service = Service::open(&ipc, service, own.dof(), journal)?;
+        let lost = config.lost_lines.clone();
+        let service = Service::open(&ipc, service, own.dof(), journal, lost)?;
         signs.open.fetch_add(1, Ordering::Release);
         service.run(&signs.done);
         Ok(())

@@ -1,7 +1,8 @@
 //! The service thread: events, telemetry, and the desk where commands are answered. It never waits
 //! for anything.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -34,6 +35,7 @@ pub(crate) struct Service {
     snapshots: u64,
     newest: Option<Snapshot>,
     journal: Journal,
+    lost_lines: Arc<AtomicU64>,
     /// Joint states refused for their stamps that were warned of, and when.
     refused: (u64, Option<Instant>),
 }
@@ -44,6 +46,7 @@ impl Service {
         slots: ServiceEnd,
         joint_count: usize,
         journal: Journal,
+        lost_lines: Arc<AtomicU64>,
     ) -> Result<Self, IpcError> {
         Ok(Self {
             slots,
@@ -55,6 +58,7 @@ impl Service {
             snapshots: 0,
             newest: None,
             journal,
+            lost_lines,
             refused: (0, None),
         })
     }
@@ -115,6 +119,7 @@ impl Service {
             stamp_ns: report.stamp_ns,
             cycle: snapshot.cycle,
             missed_cycles: snapshot.missed,
+            lost_lines: self.lost_lines.load(Ordering::Relaxed),
             plan: snapshot.plan,
             plan_time_ns: snapshot.plan_time_ns,
             speed_scale: snapshot.rate,

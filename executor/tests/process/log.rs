@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use nullsweep_ipc_types::{CommandKind, EventKind, Mode, Reason, Verdict};
 use tempfile::TempDir;
 
-use crate::rig::{Executor, PATIENT, System, command, next, wait};
+use crate::rig::{Executor, PATIENT, System, command, newest, next, wait};
 
 /// Standard error that cannot be written to.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +49,7 @@ fn runs_without_a_log(how: Broken) {
     let (stderr, _reader) = broken(how);
     let system = System::start_to(&["--spin-us", "0"], Some(stderr));
     let events = system.ipc.event_receiver().unwrap();
+    let telemetry = system.ipc.telemetry_receiver().unwrap();
     let client = system.client();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();
     let home = system.home();
@@ -67,6 +68,9 @@ fn runs_without_a_log(how: Broken) {
     assert_eq!(Verdict::from_wire(verdict), Some(Verdict::Accepted), "{how:?}");
     assert_eq!(next(&events, id), (EventKind::Aborted, Reason::Stopped), "{how:?}");
     system.wait_for(Mode::Hold);
+    // Who watches the executor sees that its log has holes; a pipe still has room in the buffer.
+    let lost = newest(&telemetry).lost_lines;
+    assert_eq!(lost > 0, !matches!(how, Broken::Full), "{how:?}: {lost}");
     let asked = Instant::now();
     system.terminate();
     let (seen, _) = system.finish();
