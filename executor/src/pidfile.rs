@@ -5,6 +5,8 @@ use std::fs::{self, DirBuilder, File, Permissions, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use rustix::fd::OwnedFd;
 use rustix::process::{Pid, PidfdFlags, Signal, geteuid, pidfd_open, pidfd_send_signal};
@@ -12,6 +14,9 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// The folder of such files, in a folder for such things.
 const FOLDER: &str = "nullsweep";
+
+/// How long somebody may look at the file.
+const LOOKED_AT: Duration = Duration::from_millis(200);
 
 /// Why a process could not be told to be the executor, or not be signalled.
 #[derive(Debug, thiserror::Error)]
@@ -51,12 +56,18 @@ impl PidFile {
         let folder = own_folder()?;
         let path = folder.join(name(robot, root));
         let failed = |error| PidFileError::Write { path: path.clone(), error };
+        let start = Instant::now();
         loop {
             let mut open = File::options();
             open.read(true).write(true).create(true).truncate(false);
             let mut file = open.open(&path).map_err(failed)?;
             match file.try_lock() {
                 Ok(()) => {}
+                // Who looks for an executor locks it for a moment.
+                Err(TryLockError::WouldBlock) if start.elapsed() < LOOKED_AT => {
+                    thread::sleep(LOOKED_AT / 10);
+                    continue;
+                }
                 Err(TryLockError::WouldBlock) => {
                     let pid = read_pid(&mut file).map_or_else(|| "?".into(), |pid| pid.to_string());
                     return Err(PidFileError::Taken { pid });
@@ -96,7 +107,9 @@ impl Running {
     /// The executor for `robot` under `root`, if this user runs one.
     pub(crate) fn find(robot: &str, root: Option<&Path>) -> Option<Self> {
         let name = name(robot, root);
-        folders().iter().find_map(|folder| Self::of_file(&folder.join(&name)))
+        // In another user's folder stands what that one likes.
+        let own = folders().into_iter().filter(|folder| is_own(folder).is_ok());
+        own.map(|folder| folder.join(&name)).find_map(|file| Self::of_file(&file))
     }
 
     fn of_file(path: &Path) -> Option<Self> {
@@ -199,11 +212,17 @@ fn keep(folder: &Path) -> io::Result<()> {
         Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e),
         _ => {}
     }
-    let facts = fs::symlink_metadata(folder)?;
-    if !facts.is_dir() || facts.uid() != geteuid().as_raw() {
-        return Err(io::Error::other("it is another user's, or no folder"));
-    }
+    is_own(folder)?;
     fs::set_permissions(folder, Permissions::from_mode(0o700))
+}
+
+/// Whether a folder is this user's, and no link to anywhere.
+fn is_own(folder: &Path) -> io::Result<()> {
+    let facts = fs::symlink_metadata(folder)?;
+    if facts.is_dir() && facts.uid() == geteuid().as_raw() {
+        return Ok(());
+    }
+    Err(io::Error::other("it is another user's, or no folder"))
 }
 
 #[cfg(test)]
@@ -243,7 +262,13 @@ mod tests {
         assert_eq!(fs::metadata(&folder).unwrap().mode() & 0o777, 0o700);
         let link = place.path().join("link");
         std::os::unix::fs::symlink(&folder, &link).unwrap();
-        assert!(keep(&link).is_err(), "it may lead anywhere");
+        assert!(keep(&link).is_err() && is_own(&link).is_err(), "it may lead anywhere");
+        assert!(is_own(&folder).is_ok());
+        if std::os::unix::fs::chown(&folder, Some(65534), None).is_ok() {
+            assert!(keep(&folder).is_err() && is_own(&folder).is_err());
+        } else {
+            println!("skipped: only root can give a folder away");
+        }
     }
 
     #[test]
