@@ -5,12 +5,12 @@
 //! loop, in [`crate::cycle`].
 
 mod motion;
-
-use core::fmt;
+mod plan;
+mod rejection;
 
 use nullsweep_ipc_types::{
-    Interpolation, JoinRule, Knot, MAX_HELD_JOINTS, MAX_KNOTS, PlanHeader, PlanId, PlanMessage,
-    Reason, checksum,
+    Interpolation, JoinRule, Knot, MAX_HELD_JOINTS, MAX_KNOTS, PlanHeader, PlanMessage, Reason,
+    checksum,
 };
 
 use crate::guard::Guard;
@@ -19,173 +19,14 @@ use crate::total::{greater, within};
 use crate::{JointVector, MAX_DOF};
 use motion::{check_corners, check_end, check_segments};
 
+pub(crate) use plan::Shape;
+pub use plan::{Join, ValidPlan};
+pub use rejection::Rejection;
+
 /// Plan times are whole nanoseconds in an `f64`. \[ns\]
 const LONGEST_NS: u64 = 1 << 53;
 /// The rate of plan time never changes faster than from 0 to 1 in 20 ms, nor slower than in 1 s.
 const RAMP: (f64, f64) = (1.0, 50.0);
-
-/// How a plan joins the motion that is going on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Join {
-    /// Stop on the path, then start.
-    Stop,
-    /// Start when what runs and waits has ended.
-    After,
-    /// Start in a knot of the running plan.
-    Knot {
-        /// The running plan.
-        plan: PlanId,
-        /// Its knot.
-        knot: usize,
-    },
-}
-
-/// What a plan does between its knots, and in them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shape {
-    /// How to move between knots.
-    pub(crate) interpolation: Interpolation,
-    /// Whether a linear plan's velocity may step in every knot.
-    pub(crate) corners: bool,
-}
-
-/// A plan that has passed every check that does not depend on the moment. Its fields are
-/// private and nothing changes it, so the loop need not look again.
-#[derive(Debug, PartialEq)]
-pub struct ValidPlan {
-    id: PlanId,
-    join: Join,
-    shape: Shape,
-    knots: Vec<PlanKnot>,
-    /// The knots' times once more, close together, to be searched.
-    times: Vec<f64>,
-    waited: f64,
-}
-
-impl ValidPlan {
-    /// A plan that was checked.
-    pub(crate) fn new(
-        id: PlanId,
-        join: Join,
-        shape: Shape,
-        knots: Vec<PlanKnot>,
-        waited: f64,
-    ) -> Self {
-        let times = knots.iter().map(|k| k.time).collect();
-        Self { id, join, shape, knots, times, waited }
-    }
-
-    /// The time from its publication to the end of its check, which the loop tells with its
-    /// acceptance. \[s\]
-    #[must_use]
-    pub fn waited(&self) -> f64 {
-        self.waited
-    }
-
-    /// Notes that the check is done.
-    pub(crate) fn checked(mut self, now_ns: u64) -> Self {
-        self.waited = now_ns.saturating_sub(self.id.epoch) as f64 * 1e-9;
-        self
-    }
-
-    /// Names it.
-    #[must_use]
-    pub fn id(&self) -> PlanId {
-        self.id
-    }
-
-    /// How it joins.
-    #[must_use]
-    pub fn join(&self) -> Join {
-        self.join
-    }
-
-    /// How to move between knots.
-    #[must_use]
-    pub fn interpolation(&self) -> Interpolation {
-        self.shape.interpolation
-    }
-
-    /// Whether its velocity may step in every knot, the first and the last one too: bang-bang.
-    #[must_use]
-    pub fn has_corners(&self) -> bool {
-        self.shape.corners
-    }
-
-    /// At least two knots, times from 0 and rising strictly.
-    #[must_use]
-    pub fn knots(&self) -> &[PlanKnot] {
-        &self.knots
-    }
-
-    /// The knots' times. \[ns\]
-    pub(crate) fn times(&self) -> &[f64] {
-        &self.times
-    }
-
-    /// How long it takes at full speed. \[ns\]
-    #[must_use]
-    pub fn duration(&self) -> f64 {
-        self.knots.last().map_or(0.0, |k| k.time)
-    }
-}
-
-/// Why a plan was not admitted, and where.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rejection {
-    /// The rule that it breaks.
-    pub reason: Reason,
-    /// The joint, or held joint, `u32::MAX` for none.
-    pub joint: u32,
-    /// The knot, `u32::MAX` for none.
-    pub knot: u32,
-    /// The offending value, NaN for none.
-    pub value: f64,
-    /// The bound that it broke, NaN for none.
-    pub bound: f64,
-}
-
-impl Rejection {
-    /// A rejection without a place.
-    #[must_use]
-    pub fn new(reason: Reason) -> Self {
-        Self { reason, joint: u32::MAX, knot: u32::MAX, value: f64::NAN, bound: f64::NAN }
-    }
-
-    /// With the value and its bound.
-    #[must_use]
-    pub fn value(self, value: f64, bound: f64) -> Self {
-        Self { value, bound, ..self }
-    }
-
-    /// At a joint.
-    #[must_use]
-    pub fn joint(self, joint: usize) -> Self {
-        Self { joint: small(joint), ..self }
-    }
-
-    /// At a knot.
-    #[must_use]
-    pub fn knot(self, knot: usize) -> Self {
-        Self { knot: small(knot), ..self }
-    }
-}
-
-impl fmt::Display for Rejection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.reason)?;
-        if self.knot != u32::MAX {
-            write!(f, ", knot {}", self.knot)?;
-        }
-        if self.joint != u32::MAX {
-            write!(f, ", joint {}", self.joint)?;
-        }
-        if !self.value.is_nan() || !self.bound.is_nan() {
-            write!(f, ": {} against {}", self.value, self.bound)?;
-        }
-        Ok(())
-    }
-}
 
 /// Where the joints stand that a plan takes as fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -375,10 +216,6 @@ fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
         plan.knots[i].ramp = window.back().map_or(RAMP.0, |&k| alone[k]);
     }
     plan.knots[count - 1].ramp = alone[count - 2];
-}
-
-fn small(index: usize) -> u32 {
-    u32::try_from(index).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

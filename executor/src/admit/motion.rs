@@ -8,7 +8,8 @@
 
 use nullsweep_ipc_types::{Interpolation, Reason};
 
-use super::{Rejection, ValidPlan};
+use super::plan::ValidPlan;
+use super::rejection::Rejection;
 use crate::JointVector;
 use crate::guard::Guard;
 use crate::interpolate::{reach, sample, top_acceleration, top_jerk, top_speed};
