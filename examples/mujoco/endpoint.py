@@ -69,6 +69,7 @@ class Simulation:
         self.wanted = self.data.qpos.copy()
         self.speed = np.zeros(self.dof)
         self.enabled = True
+        self.endless = self.model.jnt_limited[: self.dof] == 0
 
     def step(self):
         effort = self.p * (self.wanted - self.data.qpos) + self.d * (self.speed - self.data.qvel)
@@ -76,6 +77,11 @@ class Simulation:
         effort += self.model.dof_damping * self.speed
         self.data.ctrl[:] = effort if self.enabled else 0.0
         mujoco.mj_step(self.model, self.data)
+
+    def nearest(self, q):
+        """Whole turns of a joint that turns without end are no way to go."""
+        turns = np.round((self.data.qpos - q) / (2 * math.pi)) * self.endless
+        return q + turns * 2 * math.pi
 
     def hold(self):
         self.wanted = self.data.qpos.copy()
@@ -231,7 +237,7 @@ def main():
                     continue
                 last_deadline = s.deadline_ns
                 disabled, running = s.disable != 0, s.plan.epoch != 0
-                wanted = np.array(s.positions[:dof])
+                wanted = simulation.nearest(np.array(s.positions[:dof]))
                 far = np.abs(wanted - simulation.data.qpos).max() > START_TOLERANCE
                 if not disabled and not following and far:
                     # It begins to follow only what is where the arm is, and says that it waits.

@@ -46,6 +46,8 @@ def main():
                 line = (f"{types.Mode(t.mode).text:9} knot {t.knot:5} "
                         f"{t.plan_time_ns * 1e-9:7.2f} s  speed {100 * t.speed_scale:3.0f} %  "
                         f"error {error:.4f} rad  missed {t.missed_cycles}")
+                if t.lost_lines:
+                    line += f"  log lines lost {t.lost_lines}"
                 if fault != types.Fault.NONE:
                     line += f"  {fault.text}"
                 print("\r" + line + "\033[K", end="", flush=True)

@@ -4,6 +4,7 @@
 """
 
 import ctypes
+import pathlib
 import sys
 import time
 
@@ -20,6 +21,27 @@ def now_ns():
     return time.clock_gettime_ns(time.CLOCK_MONOTONIC)
 
 
+def refuse_empty(prefix):
+    """iceoryx2 waits without end on a segment of length 0, as a process leaves that died while it
+    made it. One that is just being made has a length a moment later."""
+    end = time.monotonic() + 3.0
+    while True:
+        empty = sorted(p for p in pathlib.Path("/dev/shm").glob(prefix + "*") if length(p) == 0)
+        if not empty:
+            return
+        if time.monotonic() > end:
+            sys.exit(f"{empty[0]} is empty: a process died while it made it, or another user wrote to "
+                     "it; remove it and try again: no process that runs needs it")
+        time.sleep(0.025)
+
+
+def length(path):
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return None
+
+
 class Ipc:
     """One process's door to a robot's services. `root` is what --ipc-root is on the Rust side; it
     must be given together with the prefix that the Rust side derives from it, see `prefix_of`."""
@@ -32,6 +54,7 @@ class Ipc:
             config.global_cfg.root_path = iox2.Path.new(root)
             config.global_cfg.prefix = iox2.FileName.new(prefix_of(root))
             builder = builder.config(config)
+        refuse_empty("iox2_" if root is None else prefix_of(root))
         self.robot = robot
         self.node = builder.create(iox2.ServiceType.Ipc)
 

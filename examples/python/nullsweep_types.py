@@ -120,14 +120,16 @@ class PlanHeader(ctypes.Structure):
         ("interpolation", ctypes.c_uint32),
         ("join_rule", ctypes.c_uint32),
         ("join_knot", ctypes.c_uint32),
+        ("corners", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
     ]
 
     @staticmethod
     def type_name():
-        return "nullsweep.PlanHeader.v1"
+        return "nullsweep.PlanHeader.v2"
 
 
-assert ctypes.sizeof(PlanHeader) == 392
+assert ctypes.sizeof(PlanHeader) == 400
 
 
 class Setpoint(ctypes.Structure):
@@ -244,6 +246,7 @@ class Telemetry(ctypes.Structure):
         ("stamp_ns", ctypes.c_uint64),
         ("cycle", ctypes.c_uint64),
         ("missed_cycles", ctypes.c_uint64),
+        ("lost_lines", ctypes.c_uint64),
         ("plan", PlanId),
         ("plan_time_ns", ctypes.c_uint64),
         ("speed_scale", ctypes.c_double),
@@ -260,10 +263,10 @@ class Telemetry(ctypes.Structure):
 
     @staticmethod
     def type_name():
-        return "nullsweep.Telemetry.v2"
+        return "nullsweep.Telemetry.v3"
 
 
-assert ctypes.sizeof(Telemetry) == 720
+assert ctypes.sizeof(Telemetry) == 728
 
 
 class EventKind(enum.IntEnum):
@@ -305,6 +308,8 @@ class Reason(enum.IntEnum):
     ACCELERATION = 19
     REPEATED = 20
     GOAL = 21
+    CORNER = 22
+    JERK = 23
 
 
 _TEXTS[EventKind] = {
@@ -337,6 +342,8 @@ _TEXTS[Reason] = {
     Reason.ACCELERATION: "above the acceleration limit",
     Reason.REPEATED: "a plan of this id came before",
     Reason.GOAL: "the arm did not come to rest at the plan's end",
+    Reason.CORNER: "a corner that the plan does not ask for",
+    Reason.JERK: "above the jerk limit",
 }
 
 

@@ -93,6 +93,7 @@ impl Guard {
             upper: 0.0,
             velocity: 0.0,
             acceleration: 0.0,
+            jerk: None,
             k_position: None,
             continuous: false,
         };

@@ -14,7 +14,7 @@ const REMEMBERED: usize = 1024;
 /// and still no id is taken twice. A plan is published a moment before it comes, so a new one is
 /// refused only if more than [`REMEMBERED`] newer ones have come before it.
 #[derive(Debug, Default)]
-pub(crate) struct Ids {
+pub struct Ids {
     known: VecDeque<PlanId>,
     forgotten: u64,
 }
@@ -22,11 +22,10 @@ pub(crate) struct Ids {
 impl Ids {
     /// Adds to what was found of a plan whether its id is new. Where the message was broken, or from
     /// another time, the id means nothing and is not remembered.
-    pub(crate) fn judge<T>(
-        &mut self,
-        id: PlanId,
-        found: Result<T, Rejection>,
-    ) -> Result<T, Rejection> {
+    ///
+    /// # Errors
+    /// What was found, or that the id came before.
+    pub fn judge<T>(&mut self, id: PlanId, found: Result<T, Rejection>) -> Result<T, Rejection> {
         use Reason::{Checksum, Epoch, Malformed};
         if found.as_ref().is_err_and(|why| matches!(why.reason, Checksum | Epoch | Malformed)) {
             return found;

@@ -95,6 +95,16 @@ pub fn top_acceleration(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usiz
     }
 }
 
+/// The jerk of joint `j` within a curve, NaN where that is no number; it is constant there, and the
+/// acceleration steps between two curves. A straight segment has none. \[rad/s³\]
+#[must_use]
+pub fn top_jerk(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> f64 {
+    match kind {
+        Interpolation::Linear => 0.0,
+        Interpolation::Cubic => (6.0 * Cubic::new(a, b, j).c3).abs() / seconds(a, b).powi(3),
+    }
+}
+
 /// The lowest and highest position of joint `j` within the segment, NaN where one of them is no
 /// number. \[rad\]
 #[must_use]

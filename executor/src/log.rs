@@ -10,12 +10,14 @@
 
 use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::thread::{self, Thread};
 use std::time::{Duration, Instant};
+
+use tracing_subscriber::EnvFilter;
 
 /// Bytes that may wait to be written: some 2000 lines.
 const ROOM: usize = 256 << 10;
@@ -33,7 +35,7 @@ const LOOK: Duration = Duration::from_millis(100);
 struct Shared {
     waiting: Mutex<VecDeque<u8>>,
     /// Lines that were lost.
-    lost: AtomicU64,
+    lost: Arc<AtomicU64>,
     /// No more lines will come.
     ends: AtomicBool,
     /// Nothing will be written any more.
@@ -42,7 +44,7 @@ struct Shared {
 
 /// The log. Writing to a [`Line`] of it never blocks and never fails.
 #[derive(Debug)]
-pub(crate) struct Log {
+pub struct Log {
     shared: Arc<Shared>,
     writer: Option<Thread>,
 }
@@ -55,9 +57,29 @@ pub(crate) struct Line {
 }
 
 impl Log {
+    /// Takes what `tracing` is told by this process from now on, panics too, to standard error.
+    /// `filter`: what is logged where the environment (`RUST_LOG`) does not say. Another program's
+    /// subscriber, where one is there already, stays.
+    #[must_use]
+    pub fn install(filter: &str) -> Self {
+        let log = Self::to_stderr();
+        let line = log.line();
+        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(filter));
+        let _ = tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_target(false)
+            .with_ansi(io::stderr().is_terminal())
+            .log_internal_errors(false)
+            .with_writer(move || line.clone())
+            .try_init();
+        // The usual one writes to standard error itself, which may hang.
+        std::panic::set_hook(Box::new(|panic| tracing::error!("{panic}")));
+        log
+    }
+
     /// A log to standard error. Past the lock of [`io::stderr`], which would be held while a
     /// write hangs.
-    pub(crate) fn to_stderr() -> Self {
+    fn to_stderr() -> Self {
         match io::stderr().as_fd().try_clone_to_owned() {
             Ok(own) => Self::start(File::from(own)),
             Err(_) => Self::start(io::stderr()),
@@ -67,7 +89,7 @@ impl Log {
     fn start(mut sink: impl Write + Send + 'static) -> Self {
         let shared = Arc::new(Shared {
             waiting: Mutex::new(VecDeque::with_capacity(ROOM)),
-            lost: AtomicU64::new(0),
+            lost: Arc::default(),
             ends: AtomicBool::new(false),
             ended: AtomicBool::new(false),
         });
@@ -78,12 +100,17 @@ impl Log {
         Self { shared, writer }
     }
 
+    /// How many lines were lost so far.
+    pub(crate) fn lost(&self) -> Arc<AtomicU64> {
+        self.shared.lost.clone()
+    }
+
     pub(crate) fn line(&self) -> Line {
         Line { shared: self.shared.clone(), writer: self.writer.clone() }
     }
 
     /// Waits until everything is written, but not for long. Returns how many lines were lost.
-    pub(crate) fn end(self) -> u64 {
+    pub fn end(self) -> u64 {
         self.shared.ends.store(true, Ordering::Release);
         let Some(writer) = &self.writer else { return self.shared.lost.load(Ordering::Relaxed) };
         writer.unpark();
@@ -174,7 +201,7 @@ impl Write for Line {
 }
 
 /// Writes a last message to standard error, where it can be written at once.
-pub(crate) fn last_words(text: &str) {
+pub fn last_words(text: &str) {
     let log = Log::to_stderr();
     let _ = writeln!(log.line(), "{text}");
     log.end();

@@ -65,6 +65,7 @@ pub(crate) fn message(number: u64, points: &[(u64, JointVector)]) -> (PlanHeader
         joint_count: 7,
         knot_count: points.len() as u32,
         held_count: 2,
+        corners: 1,
         ..PlanHeader::default()
     };
     header.held_positions[..2].copy_from_slice(&[0.2, 3.1 - core::f64::consts::TAU]);

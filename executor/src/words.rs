@@ -86,13 +86,14 @@ impl Words {
         if value.is_nan() && bound.is_nan() {
             return text;
         }
-        let per_second = reason == Reason::Velocity
+        let per_second = matches!(reason, Reason::Velocity | Reason::Corner)
             || reason == Reason::Start
                 && self.velocity_tolerances.get(joint as usize) == Some(&bound);
         let unit = match reason {
             Reason::TimeOrder | Reason::Epoch => " ns".into(),
             _ if unit.is_empty() => String::new(),
             Reason::Acceleration => format!(" {unit}/s²"),
+            Reason::Jerk => format!(" {unit}/s³"),
             _ if per_second => format!(" {unit}/s"),
             _ => format!(" {unit}"),
         };
@@ -101,7 +102,10 @@ impl Words {
                 write!(text, ": planned for {value:.4}{unit}, measured at {bound:.4}{unit}")
             }
             Reason::Start => write!(text, ": {value:.6}{unit} off, at most {bound:.6}{unit}"),
-            Reason::SoftLimit | Reason::Velocity | Reason::Acceleration => {
+            Reason::Corner => {
+                write!(text, ": a step of {value:.4}{unit}, at most {bound:.4}{unit}")
+            }
+            Reason::SoftLimit | Reason::Velocity | Reason::Acceleration | Reason::Jerk => {
                 write!(text, ": {value:.4}{unit} against the limit {bound:.4}{unit}")
             }
             _ if bound.is_nan() => write!(text, ": {value}{unit}"),
@@ -238,6 +242,11 @@ fn remedy(reason: Reason, kind: EventKind) -> &'static str {
             "plan within this executor's limits (the same --urdf, --profile acceleration), or stop \
              before it (--join stop)"
         }
+        Reason::Corner => {
+            "bang-bang is for plans whose header says so (`corners`); else send a curve (--profile \
+             acceleration)"
+        }
+        Reason::Jerk => "plan slower than this executor's limits: the same --urdf, a lower --v-max",
         Reason::Goal => "look what holds the arm; the bounds are --goal-tolerance and --goal-ms",
         Reason::Repeated => "nothing: the plan that came first counts; publish gives a new id",
         Reason::Start => "plan from where the arm holds (--start), or take the arm there first",

@@ -39,7 +39,7 @@ wire_enum! {
         Unknown = 3 => "unknown command",
         /// The cause of the fault is still there.
         StillFaulty = 4 => "the cause of the fault is still there",
-        /// The command queue to the loop is full.
+        /// The loop did not take it in time; it is not carried out.
         Busy = 5 => "busy",
     }
 }

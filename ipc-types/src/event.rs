@@ -71,6 +71,10 @@ wire_enum! {
         Repeated = 20 => "a plan of this id came before",
         /// The last knot was commanded, but the arm did not come to rest there in time.
         Goal = 21 => "the arm did not come to rest at the plan's end",
+        /// A linear plan steps in velocity, and its header does not ask for corners.
+        Corner = 22 => "a corner that the plan does not ask for",
+        /// A curve changes a joint's acceleration faster than its limit.
+        Jerk = 23 => "above the jerk limit",
     }
 }
 

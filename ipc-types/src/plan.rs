@@ -98,7 +98,7 @@ impl Knot {
 /// What the executor must know of a plan before it admits it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
-#[type_name("nullsweep.PlanHeader.v1")]
+#[type_name("nullsweep.PlanHeader.v2")]
 pub struct PlanHeader {
     /// This plan.
     pub id: PlanId,
@@ -127,8 +127,14 @@ pub struct PlanHeader {
     pub join_rule: u32,
     /// The knot of `join_plan` in which this plan starts, for [`JoinRule::AtKnot`].
     pub join_knot: u32,
+    /// Non-zero: the velocity may step in every knot of a [`Interpolation::Linear`] plan, in the first
+    /// and the last one too: bang-bang. Zero: it steps by no more than the joints may change it in a
+    /// cycle.
+    pub corners: u32,
+    /// Zero.
+    pub reserved: u32,
 }
-assert_layout!(PlanHeader, 392);
+assert_layout!(PlanHeader, 400);
 
 impl Default for PlanHeader {
     fn default() -> Self {

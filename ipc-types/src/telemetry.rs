@@ -76,7 +76,7 @@ pub const fn bucket_upper_ns(bucket: usize) -> u64 {
 /// A snapshot of the executor, about 100 Hz.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
-#[type_name("nullsweep.Telemetry.v2")]
+#[type_name("nullsweep.Telemetry.v3")]
 pub struct Telemetry {
     /// Rises by one each sample.
     pub sequence: u64,
@@ -86,6 +86,8 @@ pub struct Telemetry {
     pub cycle: u64,
     /// Deadlines that the loop missed since it was armed.
     pub missed_cycles: u64,
+    /// Lines of the executor's log that nobody took and that are lost.
+    pub lost_lines: u64,
     /// The plan in execution, [`PlanId::NONE`] for none.
     pub plan: PlanId,
     /// Time within that plan. \[ns\]
@@ -112,4 +114,4 @@ pub struct Telemetry {
     /// The knot whose segment is being executed.
     pub knot: u32,
 }
-assert_layout!(Telemetry, 720);
+assert_layout!(Telemetry, 728);

@@ -97,12 +97,12 @@ fn the_seat_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0xde5a_8644_26a4_07ee),
-                ("tsp acceleration", 0xbd55_a549_3b4d_8e2a),
-                ("curvature velocity", 0xe2f6_2c6e_792b_f1f0),
-                ("curvature acceleration", 0x18f5_db5f_9fdf_edd3),
-                ("joint velocity", 0x16f5_c5be_886e_3d6f),
-                ("joint acceleration", 0xc728_437b_5bcb_9997),
+                ("tsp velocity", 0x0340_eaa2_38f9_2947),
+                ("tsp acceleration", 0x1955_d49a_a8af_b0e3),
+                ("curvature velocity", 0xfb92_3e0f_1bc9_81c5),
+                ("curvature acceleration", 0x16b2_41f7_76d3_fdac),
+                ("joint velocity", 0x62f2_707d_63b1_acd4),
+                ("joint acceleration", 0x99d8_8c8c_aab2_d085),
             ],
         );
     }
@@ -116,12 +116,12 @@ fn the_chair_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0x8a18_cd1c_1eba_f4ba),
-                ("tsp acceleration", 0xe2dc_b122_dd71_74c9),
-                ("curvature velocity", 0x045d_0ede_5a18_bd9a),
-                ("curvature acceleration", 0x994b_52d6_77f3_35e6),
-                ("joint velocity", 0x5fc5_2f51_48ab_9999),
-                ("joint acceleration", 0x1a21_b420_56a0_eedc),
+                ("tsp velocity", 0xb74d_e103_b01b_94db),
+                ("tsp acceleration", 0x6671_a5e8_2636_1a6f),
+                ("curvature velocity", 0x0cc2_6750_e4e2_9760),
+                ("curvature acceleration", 0x75d7_7a1f_51eb_7639),
+                ("joint velocity", 0xf991_6470_d2ff_a278),
+                ("joint acceleration", 0xa061_3ce0_1bea_1026),
             ],
         );
     }
@@ -135,12 +135,12 @@ fn the_car_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0x6e47_d2d8_242b_3ad5),
-                ("tsp acceleration", 0xf0ce_14cb_a62a_49cb),
-                ("curvature velocity", 0x4028_8126_a37f_c8e9),
-                ("curvature acceleration", 0xee9a_fa74_0323_50fc),
-                ("joint velocity", 0x1025_ad4a_0216_6e06),
-                ("joint acceleration", 0xd413_bbec_93be_777b),
+                ("tsp velocity", 0x9fed_a023_7e2f_0b3d),
+                ("tsp acceleration", 0x25bb_7b48_98cd_9682),
+                ("curvature velocity", 0xa078_84f2_69b7_dcde),
+                ("curvature acceleration", 0x62f0_6eb9_cc2c_f76e),
+                ("joint velocity", 0x5be7_c971_4bba_a573),
+                ("joint acceleration", 0xab4a_ff9e_bc55_9898),
             ],
         );
     }
@@ -170,7 +170,7 @@ fn a_stance_is_chosen_as_ever() {
         let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
         assert_golden(
             &[("left arm".into(), outcome.plan.digest().expect("short enough"))],
-            &[("left arm", 0x0f31_f46e_66a4_4598)],
+            &[("left arm", 0x270f_71bc_5ae0_8749)],
         );
     }
 }
@@ -195,7 +195,7 @@ fn given_poses_are_planned_as_ever() {
     let outcome = task::run(&Robot::pr2(), &common::dome(), &config, &Silent).expect("a plan");
     assert_golden(
         &[("dome".into(), outcome.plan.digest().expect("short enough"))],
-        &[("dome", 0x82e9_079d_03be_1879)],
+        &[("dome", 0x7fc8_8066_5140_c240)],
     );
 }
 
@@ -225,7 +225,7 @@ fn another_arm_is_planned_as_ever() {
         let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
         assert_golden(
             &[("panda".into(), outcome.plan.digest().expect("short enough"))],
-            &[("panda", 0xe407_91b2_2267_ca29)],
+            &[("panda", 0xb4ae_4035_c795_bb0a)],
         );
     }
 }

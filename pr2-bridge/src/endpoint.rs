@@ -9,7 +9,7 @@ use nullsweep_executor::Guard;
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::{JointStates, MAX_HELD_JOINTS, status};
-use nullsweep_robot::Arm;
+use nullsweep_robot::{Arm, Continuous};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::args::{Common, RunArgs};
@@ -64,6 +64,7 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
         timeout_ns: args.timeout * 1_000_000,
         stop_acceleration: args.stop_acceleration,
         start_tolerance: Guard::START_TOLERANCE,
+        continuous: Continuous::of(arm.limits()),
     });
     let mut told = Told::default();
     let mut due_ns = now_ns();

@@ -9,10 +9,10 @@ mod stream;
 mod trajectory;
 mod whole;
 
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use nullsweep_executor::log::{Log, last_words};
 
 use args::{Common, RunArgs};
 
@@ -42,23 +42,18 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| "pr2_bridge=info,warn".into());
-    let colours = std::io::stderr().is_terminal();
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(colours)
-        .with_writer(std::io::stderr)
-        .init();
+    // The executor's: no setpoint waits for whoever reads it.
+    let log = Log::install("pr2_bridge=info,warn");
     let result = match &cli.command {
         Command::Run(args) => endpoint::run(&cli.common, args),
         Command::Reset => link::call(&cli.common, link::Service::Reset),
         Command::Halt => link::call(&cli.common, link::Service::Halt),
     };
+    log.end();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("pr2-bridge: {error:#}");
+            last_words(&format!("pr2-bridge: {error:#}"));
             ExitCode::FAILURE
         }
     }

@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 
 use nullsweep_ipc_types::{Mode, Setpoint};
+use nullsweep_robot::{Continuous, JointVector};
 
 use crate::playout::Playout;
 
@@ -46,6 +47,8 @@ pub struct Rules {
     pub stop_acceleration: f64,
     /// How far the first setpoint that is followed may be from the arm. \[rad\]
     pub start_tolerance: f64,
+    /// Of which joints whole turns are no distance.
+    pub continuous: Continuous,
 }
 
 /// A point of a message.
@@ -108,6 +111,8 @@ struct Following {
     sent_ns: u64,
     /// The last setpoint.
     last: (Joints, Joints),
+    /// Whole turns that bring the setpoints to where the arm is. \[rad\]
+    turns: Joints,
     /// When following began, and how far the controller's own setpoint was from the first one.
     began_ns: u64,
     offset: Joints,
@@ -169,8 +174,9 @@ impl Stream {
         }
         let (sequence, deadline_ns) = (setpoint.sequence, setpoint.deadline_ns);
         if sequence <= self.last_sequence {
-            // Another executor, which counts from 1 again.
+            // Another executor, which counts from 1 again and knows nothing of the first one's.
             self.stop(Stop::Ceased);
+            self.known.clear();
         }
         self.last_deadline_ns = Some(deadline_ns);
         self.last_sequence = sequence;
@@ -192,7 +198,10 @@ impl Stream {
     /// Begins to follow with this setpoint, if it is where the arm is, which has come to rest.
     /// While the arm follows nothing, the executor's setpoints follow the arm.
     fn begin(&mut self, setpoint: &Setpoint, q: &Joints, measured: &Joints) {
-        let far = (0..DOF).any(|j| (q[j] - measured[j]).abs() > self.rules.start_tolerance);
+        let turns = self.turns_to(q, measured);
+        let q = &std::array::from_fn(|j| q[j] + turns[j]);
+        // A position that is no number is not near.
+        let far = !(0..DOF).all(|j| (q[j] - measured[j]).abs() <= self.rules.start_tolerance);
         self.refused += u64::from(far);
         if far {
             self.stopped.get_or_insert(Stop::Far);
@@ -212,14 +221,23 @@ impl Stream {
             sent_ns: at_ns,
             began_ns: at_ns,
             last: (*q, [0.0; DOF]),
+            turns,
             offset: std::array::from_fn(|j| from[j] - q[j]),
         });
         self.stopped = None;
         self.stands = false;
     }
 
+    /// Whole turns of the continuous joints that bring `q` nearest to where the arm is. \[rad\]
+    fn turns_to(&self, q: &Joints, measured: &Joints) -> Joints {
+        let wide = |q: &Joints| JointVector::from_fn(|j| q.get(j).copied().unwrap_or(0.0));
+        let turns = self.rules.continuous.turns_to(&wide(q), &wide(measured));
+        std::array::from_fn(|j| turns[j])
+    }
+
     fn follow(&mut self, sequence: u64, deadline_ns: u64, q: Joints, v: Joints) {
         let Some(f) = &mut self.following else { return };
+        let q: Joints = std::array::from_fn(|j| q[j] + f.turns[j]);
         let still = v == [0.0; DOF] && f.last == (q, v);
         f.last = (q, v);
         f.playout.advance(sequence, deadline_ns, still);

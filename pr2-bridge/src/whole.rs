@@ -1,7 +1,7 @@
 //! Whole plans: each admitted by the executor's own rules and sent as one goal. A plan that joins
 //! another one in a knot takes its place there; the controller splices it.
 
-use nullsweep_executor::{Guard, Held, Join, Rejection, Rules, ValidPlan, admit};
+use nullsweep_executor::{Guard, Held, Ids, Join, Rejection, Rules, ValidPlan, admit};
 use nullsweep_ipc_types::ports::{Ipc, PlanReceiver, Sender, now_ns};
 use nullsweep_ipc_types::{
     EventKind, Interpolation, JointStates, Knot, MAX_KNOTS, Mode, PlanEvent, Reason, Telemetry,
@@ -37,6 +37,7 @@ pub struct Whole {
     events: Sender<PlanEvent>,
     telemetry: Sender<Telemetry>,
     rules: Rules,
+    ids: Ids,
     names: Vec<String>,
     state: Option<JointStates>,
     running: Option<Running>,
@@ -68,6 +69,7 @@ impl Whole {
             events: ipc.event_sender()?,
             telemetry: ipc.telemetry_sender()?,
             rules,
+            ids: Ids::default(),
             names: arm.joint_names().to_vec(),
             state: None,
             running: None,
@@ -93,6 +95,7 @@ impl Whole {
                 .state
                 .map(|s| Held { positions: s.held_positions, count: s.held_count as usize });
             let admitted = admit(&header, &knots, held.as_ref(), &self.rules, now_ns());
+            let admitted = self.ids.judge(header.id, admitted);
             match admitted.and_then(|plan| self.fit(&plan, ready).map(|start| (plan, start))) {
                 Ok((plan, start)) => self.begin(plan, start, link)?,
                 Err(why) => {

@@ -2,7 +2,7 @@
 
 use crate::urdf::{Joint, JointKind};
 
-/// Limits of one active joint. [rad, rad/s, rad/s²; m for prismatic joints]
+/// Limits of one active joint. [rad, rad/s, rad/s², rad/s³; m for prismatic joints]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
     /// Lower end: the soft limit where the URDF has a safety controller, else the hard one; −∞
@@ -15,6 +15,8 @@ pub struct JointLimits {
     /// Largest acceleration: the URDF's, else from
     /// [`JointLimits::DEFAULT_ACCELERATION_TIME`].
     pub acceleration: f64,
+    /// Largest jerk, where the URDF has one.
+    pub jerk: Option<f64>,
     /// Gain of the safety controller: at a distance d from a soft limit it allows a speed of
     /// k_position · d towards it. [1/s]
     pub k_position: Option<f64>,
@@ -51,6 +53,7 @@ impl JointLimits {
             acceleration: hard
                 .acceleration
                 .unwrap_or(hard.velocity / Self::DEFAULT_ACCELERATION_TIME),
+            jerk: hard.jerk,
             // Without soft limits there is nothing that the gain could act on.
             k_position: joint.safety.and_then(|s| s.k_position).filter(|_| soft.is_some()),
             continuous,
@@ -88,6 +91,7 @@ mod tests {
             upper: -0.1,
             velocity: 3.078,
             acceleration: 8.0,
+            jerk: None,
             k_position: Some(20.0),
             continuous: false,
         }

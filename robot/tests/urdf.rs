@@ -216,7 +216,14 @@ fn soft_limits_margins_and_accelerations() {
     );
     assert!(round.continuous && round.lower == f64::NEG_INFINITY && round.upper == f64::INFINITY);
     // Read although the file does not say that it is URDF 1.2.
-    assert_eq!(round.acceleration, 7.0);
+    assert_eq!((round.acceleration, round.jerk), (7.0, None));
+    let jerky = limits("continuous", "<limit effort='1' velocity='3' jerk='50'/>");
+    assert_eq!((jerky.acceleration, jerky.jerk), (6.0, Some(50.0)));
+    for (jerk, told) in [("0", "jerk"), ("-1", "jerk"), ("inf", "jerk"), ("x", "not a number")] {
+        let inner = format!("<limit effort='1' velocity='3' jerk='{jerk}'/>");
+        let error = robot("a b", &joint("j", "continuous", "a", "b", &inner)).err().unwrap();
+        assert!(error.to_string().contains(told), "{jerk}: {error}");
+    }
 }
 
 #[test]

@@ -12,6 +12,7 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::Parser;
 use comfy_table::{Table, presets};
+use nullsweep_executor::log::last_words;
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::service;
@@ -110,7 +111,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(outcome) if outcome.violations == 0 => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("mock-hardware: {error:#}");
+            last_words(&format!("mock-hardware: {error:#}"));
             ExitCode::from(2)
         }
     }
@@ -130,12 +131,13 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
     let ipc = Ipc::open(&args.arm.robot_name, args.arm.ipc_root.as_deref())?;
     let setpoints = ipc.setpoint_receiver()?;
     let states = ipc.state_sender()?;
-    eprintln!(
+    // Nobody need read it.
+    last_words(&format!(
         "mock-hardware: arm `{}` with {} joints is ready as robot `{}`",
         args.arm.arm,
         arm.dof(),
         args.arm.robot_name
-    );
+    ));
 
     let rules =
         Rules { session_timeout_ns: args.timeout.saturating_mul(1_000_000), ..Rules::default() };

@@ -67,6 +67,7 @@ impl Sketch {
             joint_count: arm.dof() as u32,
             knot_count: knots.len() as u32,
             interpolation: Interpolation::Linear.wire(),
+            corners: 1,
             join_rule: JoinRule::StopThenStart.wire(),
             ..PlanHeader::zeroed()
         };

@@ -2,8 +2,14 @@
 //! endpoints that are broken on purpose, each of which must break its own rule.
 
 use std::ffi::OsString;
-use std::process::Command;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
+use bytemuck::Zeroable;
+use nullsweep_executor::Hardware;
+use nullsweep_ipc_types::ports::{Ipc, PortError};
+use nullsweep_ipc_types::{JointStates, Setpoint, status};
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 use nullsweep_tests::conformance::{Rig, Terms, VirtualClock, VirtualEndpoint, suite};
 use nullsweep_tests::endpoint::{Behaviour, Endpoint, Fidelity};
@@ -88,6 +94,71 @@ fn a_broken_endpoint_breaks_its_own_rule() {
     assert_eq!(names, ["refuse"], "{broken:?}");
 }
 
+/// An endpoint that hears only some setpoints, says so of the others, and tells what it likes.
+struct Odd {
+    inner: VirtualEndpoint,
+    hears: fn(&Setpoint, &JointStates) -> bool,
+    tells: fn(&mut JointStates),
+    last: JointStates,
+    waits: bool,
+}
+
+impl Hardware for Odd {
+    fn read(&mut self) -> Result<Option<JointStates>, PortError> {
+        let Some(mut state) = self.inner.read()? else { return Ok(None) };
+        self.last = state;
+        if self.waits {
+            state.status |= status::SETPOINT_TIMEOUT;
+        }
+        (self.tells)(&mut state);
+        Ok(Some(state))
+    }
+
+    fn write(&mut self, setpoint: &Setpoint) -> Result<(), PortError> {
+        self.waits = !(self.hears)(setpoint, &self.last);
+        if self.waits { Ok(()) } else { self.inner.write(setpoint) }
+    }
+}
+
+#[test]
+fn an_odd_endpoint_breaks_its_own_rule_alone() {
+    type Hears = fn(&Setpoint, &JointStates) -> bool;
+    type Tells = fn(&mut JointStates);
+    let cases: [(&str, Hears, Tells); 3] = [
+        // Whole turns are a distance to it.
+        (
+            "turns",
+            |setpoint, last| {
+                let apart =
+                    setpoint.positions.iter().zip(&last.positions).map(|(a, b)| (a - b).abs());
+                !apart.fold(0.0, f64::max).ge(&3.0)
+            },
+            |_| {},
+        ),
+        // Its counter is small.
+        ("late", |setpoint, _| setpoint.sequence < 1_000_000, |_| {}),
+        // It tells now the newest, now an older one.
+        (
+            "answer",
+            |_, _| true,
+            |state| {
+                let older = if state.sequence.is_multiple_of(2) { 5 } else { 0 };
+                state.setpoint_sequence = state.setpoint_sequence.saturating_sub(older);
+            },
+        ),
+    ];
+    for (rule, hears, tells) in cases {
+        let (arm, clock) = (right_arm(), VirtualClock::default());
+        let endpoint = Endpoint::new(&arm, arm.home(), Behaviour::default(), clock.now_ns());
+        let inner = VirtualEndpoint::new(endpoint.expect("a PR2 arm"), clock.clone());
+        let odd = Odd { inner, hears, tells, last: JointStates::zeroed(), waits: false };
+        let mut rig = Rig::new(odd, clock, &arm);
+        let found = suite(&mut rig, &Terms::default(), |_| true);
+        let broken: Vec<_> = found.iter().filter(|f| f.broken.is_some()).map(|f| f.name).collect();
+        assert_eq!(broken, [rule], "{found:?}");
+    }
+}
+
 /// Against a process, as a user runs it. A loaded machine may stall either side, so the time until
 /// the watchdog is generous.
 #[test]
@@ -100,7 +171,31 @@ fn the_mock_process_keeps_every_rule() {
     let said = String::from_utf8_lossy(&run.stdout);
     let complained = String::from_utf8_lossy(&run.stderr);
     assert_eq!(run.status.code(), Some(0), "{said}{complained}\nmock: {}", mock.stderr());
-    assert_eq!(said.matches("kept").count(), 10, "{said}");
+    assert_eq!(said.matches("kept").count(), 12, "{said}");
+}
+
+/// A pipe that nobody reads and that is full: no state waits for it.
+#[test]
+fn a_mock_whose_words_nobody_reads_sends_states() {
+    let root = tempfile::TempDir::new().expect("a folder");
+    let (_reader, writer) = std::io::pipe().expect("a pipe");
+    let mut filler = writer.try_clone().expect("the same pipe");
+    std::thread::spawn(move || while filler.write_all(&[b'.'; 4096]).is_ok() {});
+    std::thread::sleep(Duration::from_millis(200));
+    let ipc = Ipc::open("pr2", Some(root.path())).expect("a door");
+    let states = ipc.state_receiver().expect("a place");
+    let mut mock = Command::new(env!("CARGO_BIN_EXE_mock-hardware"));
+    let mock = mock.arg("--ipc-root").arg(root.path()).stdout(Stdio::null()).stderr(writer).spawn();
+    let mut mock = mock.expect("it starts");
+    let end = Instant::now() + Duration::from_secs(20);
+    let mut count = 0;
+    while count < 100 && Instant::now() < end {
+        count += states.newest().expect("a port").map_or(0, |newest| newest.skipped + 1);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    mock.kill().expect("it runs");
+    mock.wait().expect("it is ours");
+    assert!(count >= 100, "{count} states");
 }
 
 #[test]

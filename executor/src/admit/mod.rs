@@ -4,176 +4,29 @@
 //! moment (where the arm holds, whether the knot to join has passed) is judged later by the
 //! loop, in [`crate::cycle`].
 
-use core::fmt;
+mod motion;
+mod plan;
+mod rejection;
 
 use nullsweep_ipc_types::{
-    Interpolation, JoinRule, Knot, MAX_HELD_JOINTS, MAX_KNOTS, PlanHeader, PlanId, PlanMessage,
-    Reason, checksum,
+    Interpolation, JoinRule, Knot, MAX_HELD_JOINTS, MAX_KNOTS, PlanHeader, PlanMessage, Reason,
+    checksum,
 };
 
 use crate::guard::Guard;
-use crate::interpolate::{PlanKnot, reach, top_acceleration, top_speed};
+use crate::interpolate::{PlanKnot, top_speed};
 use crate::total::{greater, within};
 use crate::{JointVector, MAX_DOF};
+use motion::{check_corners, check_end, check_segments};
+
+pub(crate) use plan::Shape;
+pub use plan::{Join, ValidPlan};
+pub use rejection::Rejection;
 
 /// Plan times are whole nanoseconds in an `f64`. \[ns\]
 const LONGEST_NS: u64 = 1 << 53;
-/// A planner rounds its times to whole nanoseconds, so a segment may be this much too short. \[s\]
-const ROUNDING_S: f64 = 1e-9;
-/// What a planner's acceleration may exceed its limit by, as a share of it.
-const ROUNDING_SHARE: f64 = 1e-6;
-/// Room for the rounding of positions. \[rad\]
-const SLACK: f64 = 1e-9;
 /// The rate of plan time never changes faster than from 0 to 1 in 20 ms, nor slower than in 1 s.
 const RAMP: (f64, f64) = (1.0, 50.0);
-
-/// How a plan joins the motion that is going on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Join {
-    /// Stop on the path, then start.
-    Stop,
-    /// Start when what runs and waits has ended.
-    After,
-    /// Start in a knot of the running plan.
-    Knot {
-        /// The running plan.
-        plan: PlanId,
-        /// Its knot.
-        knot: usize,
-    },
-}
-
-/// A plan that has passed every check that does not depend on the moment. Its fields are
-/// private and nothing changes it, so the loop need not look again.
-#[derive(Debug, PartialEq)]
-pub struct ValidPlan {
-    id: PlanId,
-    join: Join,
-    interpolation: Interpolation,
-    knots: Vec<PlanKnot>,
-    /// The knots' times once more, close together, to be searched.
-    times: Vec<f64>,
-    waited: f64,
-}
-
-impl ValidPlan {
-    /// A plan that was checked.
-    pub(crate) fn new(
-        id: PlanId,
-        join: Join,
-        interpolation: Interpolation,
-        knots: Vec<PlanKnot>,
-        waited: f64,
-    ) -> Self {
-        let times = knots.iter().map(|k| k.time).collect();
-        Self { id, join, interpolation, knots, times, waited }
-    }
-
-    /// The time from its publication to the end of its check, which the loop tells with its
-    /// acceptance. \[s\]
-    #[must_use]
-    pub fn waited(&self) -> f64 {
-        self.waited
-    }
-
-    /// Notes that the check is done.
-    pub(crate) fn checked(mut self, now_ns: u64) -> Self {
-        self.waited = now_ns.saturating_sub(self.id.epoch) as f64 * 1e-9;
-        self
-    }
-
-    /// Names it.
-    #[must_use]
-    pub fn id(&self) -> PlanId {
-        self.id
-    }
-
-    /// How it joins.
-    #[must_use]
-    pub fn join(&self) -> Join {
-        self.join
-    }
-
-    /// How to move between knots.
-    #[must_use]
-    pub fn interpolation(&self) -> Interpolation {
-        self.interpolation
-    }
-
-    /// At least two knots, times from 0 and rising strictly.
-    #[must_use]
-    pub fn knots(&self) -> &[PlanKnot] {
-        &self.knots
-    }
-
-    /// The knots' times. \[ns\]
-    pub(crate) fn times(&self) -> &[f64] {
-        &self.times
-    }
-
-    /// How long it takes at full speed. \[ns\]
-    #[must_use]
-    pub fn duration(&self) -> f64 {
-        self.knots.last().map_or(0.0, |k| k.time)
-    }
-}
-
-/// Why a plan was not admitted, and where.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rejection {
-    /// The rule that it breaks.
-    pub reason: Reason,
-    /// The joint, or held joint, `u32::MAX` for none.
-    pub joint: u32,
-    /// The knot, `u32::MAX` for none.
-    pub knot: u32,
-    /// The offending value, NaN for none.
-    pub value: f64,
-    /// The bound that it broke, NaN for none.
-    pub bound: f64,
-}
-
-impl Rejection {
-    /// A rejection without a place.
-    #[must_use]
-    pub fn new(reason: Reason) -> Self {
-        Self { reason, joint: u32::MAX, knot: u32::MAX, value: f64::NAN, bound: f64::NAN }
-    }
-
-    /// With the value and its bound.
-    #[must_use]
-    pub fn value(self, value: f64, bound: f64) -> Self {
-        Self { value, bound, ..self }
-    }
-
-    /// At a joint.
-    #[must_use]
-    pub fn joint(self, joint: usize) -> Self {
-        Self { joint: small(joint), ..self }
-    }
-
-    /// At a knot.
-    #[must_use]
-    pub fn knot(self, knot: usize) -> Self {
-        Self { knot: small(knot), ..self }
-    }
-}
-
-impl fmt::Display for Rejection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.reason)?;
-        if self.knot != u32::MAX {
-            write!(f, ", knot {}", self.knot)?;
-        }
-        if self.joint != u32::MAX {
-            write!(f, ", joint {}", self.joint)?;
-        }
-        if !self.value.is_nan() || !self.bound.is_nan() {
-            write!(f, ": {} against {}", self.value, self.bound)?;
-        }
-        Ok(())
-    }
-}
 
 /// Where the joints stand that a plan takes as fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -209,7 +62,8 @@ impl Rules {
 ///
 /// # Errors
 /// The first rule that it breaks, in this order: counts and enum values, checksum, epoch, robot,
-/// held joints, finite values, time order, soft limits, velocity and acceleration, rest at the end.
+/// held joints, finite values, time order, soft limits, velocity, acceleration and jerk, rest at the
+/// end, corners.
 pub fn admit(
     header: &PlanHeader,
     knots: &[Knot],
@@ -217,7 +71,7 @@ pub fn admit(
     rules: &Rules,
     now_ns: u64,
 ) -> Result<ValidPlan, Rejection> {
-    let (interpolation, join) = shape(header, knots)?;
+    let (shape, join) = shape(header, knots)?;
     if checksum(PlanMessage { header, knots }) != header.checksum {
         return Err(Rejection::new(Reason::Checksum));
     }
@@ -233,15 +87,16 @@ pub fn admit(
         return Err(Rejection::new(Reason::Robot).value(value, bound));
     }
     check_held(header, held, rules)?;
-    let mut plan = ValidPlan::new(header.id, join, interpolation, read(knots, joints)?, 0.0);
-    check_motion(&plan, &rules.guard)?;
+    let mut plan = ValidPlan::new(header.id, join, shape, read(knots, joints)?, 0.0);
+    check_segments(&plan, &rules.guard)?;
     check_end(&plan, &rules.guard)?;
+    check_corners(&plan, &rules.guard)?;
     set_ramps(&mut plan, &rules.guard);
     Ok(plan)
 }
 
 /// Counts and enum values.
-fn shape(header: &PlanHeader, knots: &[Knot]) -> Result<(Interpolation, Join), Rejection> {
+fn shape(header: &PlanHeader, knots: &[Knot]) -> Result<(Shape, Join), Rejection> {
     let malformed = Rejection::new(Reason::Malformed);
     if !(2..=MAX_KNOTS).contains(&knots.len()) {
         return Err(malformed.value(knots.len() as f64, MAX_KNOTS as f64));
@@ -264,7 +119,8 @@ fn shape(header: &PlanHeader, knots: &[Knot]) -> Result<(Interpolation, Join), R
         JoinRule::AfterCurrent => Join::After,
         JoinRule::AtKnot => Join::Knot { plan: header.join_plan, knot: header.join_knot as usize },
     };
-    Ok((interpolation, join))
+    let corners = header.corners != 0 && interpolation == Interpolation::Linear;
+    Ok((Shape { interpolation, corners }, join))
 }
 
 fn check_held(header: &PlanHeader, held: Option<&Held>, rules: &Rules) -> Result<(), Rejection> {
@@ -332,52 +188,6 @@ fn read(knots: &[Knot], joints: usize) -> Result<Vec<PlanKnot>, Rejection> {
     Ok(read)
 }
 
-/// Soft limits with the braking margin at each segment's speed, velocity limits, and acceleration
-/// limits within curves. A straight segment's corners are bang-bang, and that is allowed.
-fn check_motion(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
-    for (i, pair) in plan.knots.windows(2).enumerate() {
-        let (a, b) = (&pair[0], &pair[1]);
-        let seconds = (b.time - a.time) * 1e-9;
-        for (j, bound) in guard.used().iter().enumerate() {
-            let speed = top_speed(a, b, plan.interpolation, j);
-            let fits = speed * seconds <= bound.velocity() * (seconds + ROUNDING_S) + SLACK;
-            let (low, high) = reach(a, b, plan.interpolation, j);
-            let (lower, upper) = bound.limits_at(speed);
-            let at = |reason| Rejection::new(reason).knot(i + 1).joint(j);
-            // Written so that NaN breaks every rule.
-            if !(low >= lower - SLACK) {
-                return Err(at(Reason::SoftLimit).value(low, lower));
-            }
-            if !(high <= upper + SLACK) {
-                return Err(at(Reason::SoftLimit).value(high, upper));
-            }
-            if !fits {
-                return Err(at(Reason::Velocity).value(speed, bound.velocity()));
-            }
-            let (hardest, most) =
-                (top_acceleration(a, b, plan.interpolation, j), bound.limits.acceleration);
-            if !(hardest <= most * (1.0 + ROUNDING_SHARE) + SLACK) {
-                return Err(at(Reason::Acceleration).value(hardest, most));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// A curve must come to rest: after its last knot the arm holds.
-fn check_end(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
-    let Some(last) = plan.knots.last().filter(|_| plan.interpolation == Interpolation::Cubic)
-    else {
-        return Ok(());
-    };
-    guard.matches_velocity(&last.v, &JointVector::ZERO).map_err(|(joint, speed)| {
-        Rejection::new(Reason::Velocity)
-            .knot(plan.knots.len() - 1)
-            .joint(joint)
-            .value(speed, guard.velocity_tolerance(joint))
-    })
-}
-
 /// Gives each knot the steepest change of rate that is safe from its segment to one cycle past
 /// it, so that the loop need not look ahead. A sliding minimum, from the end.
 fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
@@ -387,7 +197,7 @@ fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
         .windows(2)
         .map(|pair| {
             let top = (0..guard.dof)
-                .map(|j| top_speed(&pair[0], &pair[1], plan.interpolation, j))
+                .map(|j| top_speed(&pair[0], &pair[1], plan.interpolation(), j))
                 .fold(0.0, greater);
             within(guard.stop_acceleration / top, RAMP.0, RAMP.1)
         })
@@ -406,10 +216,6 @@ fn set_ramps(plan: &mut ValidPlan, guard: &Guard) {
         plan.knots[i].ramp = window.back().map_or(RAMP.0, |&k| alone[k]);
     }
     plan.knots[count - 1].ramp = alone[count - 2];
-}
-
-fn small(index: usize) -> u32 {
-    u32::try_from(index).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

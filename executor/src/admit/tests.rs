@@ -133,6 +133,17 @@ const SEALED: &[Case] = &[
         Some(0),
         Some(3),
     ),
+    ("bang-bang that does not say so", |h, _| h.corners = 0, Reason::Corner, Some(0), Some(4)),
+    (
+        "a corner on the way",
+        |h, k| {
+            h.corners = 0;
+            k[2].positions[0] -= 0.03;
+        },
+        Reason::Corner,
+        Some(0),
+        Some(1),
+    ),
     // Both knots are inside, but the curve swings out between them.
     (
         "cubic swing",
@@ -228,6 +239,54 @@ fn acceleration_is_bounded_in_curves_to_within_rounding() {
             }
         }
     }
+}
+
+/// Within a curve the jerk is constant: 12 d / t³ from rest to rest. It is bounded where the URDF
+/// has a limit of it, as the acceleration is, and nowhere else.
+#[test]
+fn jerk_is_bounded_in_curves_where_there_is_a_limit() {
+    let mut guard = pr2();
+    let judge = |guard: &Guard, by: f64| {
+        let points = [(0, HOME), (500 * MS, moved(HOME, 3, by)), (1_000 * MS, HOME)];
+        let (mut header, knots) = message(1, &points);
+        header.interpolation = Interpolation::Cubic.wire();
+        seal(&mut header, &knots);
+        admit(&header, &knots, Some(&held()), &rules(guard), NOW)
+    };
+    assert!(judge(&guard, 0.1).is_ok());
+    for (share, fits) in [(1.0, true), (1.0 - 9e-7, true), (1.0 - 2e-6, false), (0.5, false)] {
+        guard.joints[3].limits.jerk = Some(12.0 * 0.1 / 0.125 * share);
+        let found = judge(&guard, 0.1);
+        assert_eq!(found.is_ok(), fits, "{share}: {found:?}");
+        if let Err(why) = found {
+            assert_eq!((why.reason, why.joint, why.knot), (Reason::Jerk, 3, 1), "{why}");
+            assert!((why.value - 9.6).abs() < 1e-9, "{why}");
+        }
+    }
+    // Another joint's is its own.
+    guard.joints[3].limits.jerk = None;
+    guard.joints[2].limits.jerk = Some(1.0);
+    assert!(judge(&guard, 0.1).is_ok());
+}
+
+/// A polyline that speeds up and slows down by no more than its joint may each cycle needs no leave.
+#[test]
+fn a_polyline_without_corners_needs_no_leave_for_them() {
+    let guard = pr2();
+    let step = guard.velocity_tolerance(0);
+    let line = |share: f64| {
+        let (mut q, mut points) = (HOME, vec![(0, HOME)]);
+        for k in 0..100u64 {
+            q[0] += share * step * k.min(99 - k) as f64 * 0.01;
+            points.push(((k + 1) * 10 * MS, q));
+        }
+        let (mut header, knots) = message(1, &points);
+        header.corners = 0;
+        seal(&mut header, &knots);
+        judge(&header, &knots, Some(&held()))
+    };
+    assert_eq!(line(0.99).map(|plan| plan.has_corners()), Ok(false));
+    assert_eq!(line(1.5).unwrap_err().reason, Reason::Corner);
 }
 
 /// Whatever stands for a number: refused, or every figure of the plan is a bounded one.

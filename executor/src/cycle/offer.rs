@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use nullsweep_ipc_types::{EventKind, Fault, Interpolation, Mode, PlanId, Reason};
+use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanId, Reason};
 
 use super::exchange::Output;
 use super::state::{State, StopCause, Turn, Waiting};
@@ -90,11 +90,8 @@ impl State {
                 return Err(near.value(first.q[j], ahead));
             }
         }
-        // A curve that is already under way at its first knot cannot start from a stand-still.
-        if plan.interpolation() == Interpolation::Cubic {
-            return meet(&JointVector::ZERO, &first.v, guard);
-        }
-        Ok(())
+        // One that is already under way at its first knot cannot start from a stand-still.
+        if plan.has_corners() { Ok(()) } else { meet(&JointVector::ZERO, &speed_from(plan), guard) }
     }
 
     /// When the plan's turn comes, `None` for at once.
@@ -159,15 +156,14 @@ impl State {
             return Err(start.joint(joint).value(apart, guard.join_tolerance));
         }
         let (before, after) = (path.speed_into(knot), speed_from(plan));
-        let curved = |p: &ValidPlan| p.interpolation() == Interpolation::Cubic;
-        match (curved(path.plan()), curved(plan)) {
+        match (path.plan().has_corners(), plan.has_corners()) {
             // A corner as bang-bang plans have them.
-            (false, false) => Ok(()),
-            (true, true) => meet(&before, &after, guard),
+            (true, true) => Ok(()),
+            (false, false) => meet(&before, &after, guard),
             // A bang-bang plan also begins and ends at speed where the arm stands.
-            (true, false) => meet(&before, &after, guard)
-                .or_else(|why| meet(&before, &JointVector::ZERO, guard).map_err(|_| why)),
             (false, true) => meet(&before, &after, guard)
+                .or_else(|why| meet(&before, &JointVector::ZERO, guard).map_err(|_| why)),
+            (true, false) => meet(&before, &after, guard)
                 .or_else(|why| meet(&JointVector::ZERO, &after, guard).map_err(|_| why)),
         }
     }

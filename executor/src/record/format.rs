@@ -8,14 +8,14 @@ use nullsweep_ipc_types::{Interpolation, PlanId};
 use nullsweep_robot::JointLimits;
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::admit::{Join, ValidPlan};
+use crate::admit::{Join, Shape, ValidPlan};
 use crate::cycle::{Ask, Input, Measured, MeasuredRecord, Order, Target};
 use crate::guard::Guard;
 use crate::interpolate::PlanKnot;
 use crate::{JointVector, MAX_DOF};
 
 /// The first bytes of a recording; the digit is the version.
-pub(crate) const MAGIC: &[u8; 8] = b"NSWREC4\n";
+pub(crate) const MAGIC: &[u8; 8] = b"NSWREC5\n";
 
 /// What a record holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,8 +70,8 @@ pub(crate) fn take<'a>(from: &mut &'a [u8]) -> Option<(Tag, &'a [u8])> {
 #[repr(C)]
 pub(crate) struct GuardRecord {
     dof: u64,
-    /// Lower, upper, velocity, acceleration, k_position (NaN for none), continuous (0 or 1).
-    joints: [[f64; 6]; MAX_DOF],
+    /// Lower, upper, velocity, acceleration, jerk and k_position (NaN for none), continuous (0 or 1).
+    joints: [[f64; 7]; MAX_DOF],
     period_ns: u64,
     stale_ns: u64,
     lost_ns: u64,
@@ -91,7 +91,8 @@ impl From<&Guard> for GuardRecord {
                 let l = j.limits;
                 let k = l.k_position.unwrap_or(f64::NAN);
                 let continuous = f64::from(u8::from(l.continuous));
-                [l.lower, l.upper, l.velocity, l.acceleration, k, continuous]
+                let jerk = l.jerk.unwrap_or(f64::NAN);
+                [l.lower, l.upper, l.velocity, l.acceleration, jerk, k, continuous]
             }),
             period_ns: g.period_ns,
             stale_ns: g.stale_ns,
@@ -115,10 +116,11 @@ impl From<&Guard> for GuardRecord {
 
 impl From<&GuardRecord> for Guard {
     fn from(r: &GuardRecord) -> Self {
-        let limits = r.joints.map(|[lower, upper, velocity, acceleration, k, continuous]| {
+        let limits = r.joints.map(|[lower, upper, velocity, acceleration, jerk, k, continuous]| {
             let k_position = (!k.is_nan()).then_some(k);
+            let jerk = (!jerk.is_nan()).then_some(jerk);
             let continuous = continuous != 0.0;
-            JointLimits { lower, upper, velocity, acceleration, k_position, continuous }
+            JointLimits { lower, upper, velocity, acceleration, jerk, k_position, continuous }
         });
         let [stop, connector, start, join, following, lag, rate] = r.bounds;
         Self {
@@ -151,6 +153,8 @@ pub(crate) struct PlanRecord {
     /// 0 stop, 1 after, 2 knot.
     join: u32,
     interpolation: u32,
+    corners: u32,
+    reserved: u32,
     /// See [`ValidPlan::waited`].
     waited: f64,
 }
@@ -164,7 +168,8 @@ impl From<&ValidPlan> for PlanRecord {
         };
         let interpolation = plan.interpolation().wire();
         let (id, waited) = (plan.id(), plan.waited());
-        Self { id, join_plan, join_knot, join, interpolation, waited }
+        let corners = u32::from(plan.has_corners());
+        Self { id, join_plan, join_knot, join, interpolation, corners, reserved: 0, waited }
     }
 }
 
@@ -183,7 +188,8 @@ pub(crate) fn plan(payload: &[u8]) -> Option<ValidPlan> {
         _ => return None,
     };
     let interpolation = Interpolation::from_wire(head.interpolation)?;
-    Some(ValidPlan::new(head.id, join, interpolation, knots, head.waited))
+    let shape = Shape { interpolation, corners: head.corners != 0 };
+    Some(ValidPlan::new(head.id, join, shape, knots, head.waited))
 }
 
 /// One cycle: what [`crate::cycle::step`] got, and the setpoint that it gave.

@@ -2,14 +2,14 @@
 
 use std::fs::File;
 use std::io::Write as _;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::{CommandKind, EventKind, Mode, Reason, Verdict};
 use tempfile::TempDir;
 
-use crate::rig::{Executor, PATIENT, System, command, next};
+use crate::rig::{Executor, PATIENT, System, command, newest, next, wait};
 
 /// Standard error that cannot be written to.
 #[derive(Clone, Copy, Debug)]
@@ -43,23 +43,13 @@ fn broken(how: Broken) -> (Stdio, Option<std::io::PipeReader>) {
     (writer.into(), Some(reader))
 }
 
-fn wait(child: &mut Child) -> Option<i32> {
-    let end = Instant::now() + Duration::from_secs(20);
-    while Instant::now() < end {
-        if let Some(status) = child.try_wait().expect("known") {
-            return status.code();
-        }
-        thread::sleep(Duration::from_millis(5));
-    }
-    panic!("it does not end");
-}
-
 /// Plans are admitted and rejected, commands answered, and SIGTERM ends it, whatever becomes of
 /// what it says. Each of these writes lines.
 fn runs_without_a_log(how: Broken) {
     let (stderr, _reader) = broken(how);
     let system = System::start_to(&["--spin-us", "0"], Some(stderr));
     let events = system.ipc.event_receiver().unwrap();
+    let telemetry = system.ipc.telemetry_receiver().unwrap();
     let client = system.client();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();
     let home = system.home();
@@ -78,6 +68,9 @@ fn runs_without_a_log(how: Broken) {
     assert_eq!(Verdict::from_wire(verdict), Some(Verdict::Accepted), "{how:?}");
     assert_eq!(next(&events, id), (EventKind::Aborted, Reason::Stopped), "{how:?}");
     system.wait_for(Mode::Hold);
+    // Who watches the executor sees that its log has holes; a pipe still has room in the buffer.
+    let lost = newest(&telemetry).lost_lines;
+    assert_eq!(lost > 0, !matches!(how, Broken::Full), "{how:?}: {lost}");
     let asked = Instant::now();
     system.terminate();
     let (seen, _) = system.finish();

@@ -1,11 +1,8 @@
 //! What becomes of published plans.
 
-use std::thread;
-use std::time::{Duration, Instant};
-
 use nullsweep_ipc_types::{EventKind, PlanHeader, PlanId, PlanMessage, Reason, checksum};
 
-use crate::rig::{System, next};
+use crate::rig::{System, newest, next};
 
 #[test]
 fn a_plan_from_publication_to_its_end() {
@@ -34,15 +31,9 @@ fn a_plan_from_publication_to_its_end() {
     assert_eq!(next(&events, id), (EventKind::Rejected, Reason::Repeated));
     assert_eq!(next(&events, id), (EventKind::Finished, Reason::None));
     let telemetry = system.ipc.telemetry_receiver().unwrap();
-    let end = Instant::now() + Duration::from_secs(5);
-    let report = loop {
-        if let Some(newest) = telemetry.newest().unwrap() {
-            break newest.value;
-        }
-        assert!(Instant::now() < end, "no telemetry");
-        thread::sleep(Duration::from_millis(1));
-    };
+    let report = newest(&telemetry);
     assert_eq!(report.commanded, knots[100].positions);
+    assert_eq!(report.lost_lines, 0);
     assert!(report.cycle > 500 && report.joint_count == 7);
 
     let (seen, log) = system.end();

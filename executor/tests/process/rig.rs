@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use bytemuck::Zeroable;
 use nullsweep_ipc_types::ports::{CommandClient, Ipc, Receiver, now_ns};
 use nullsweep_ipc_types::{
-    CommandKind, EventKind, JointStates, Knot, Mode, PlanEvent, PlanHeader, PlanId, Reason, status,
+    CommandKind, EventKind, JointStates, Knot, Mode, PlanEvent, PlanHeader, PlanId, Reason,
+    Telemetry, status,
 };
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 use tempfile::TempDir;
@@ -149,6 +150,7 @@ impl System {
             fingerprint: self.arm.fingerprint(),
             joint_count: self.arm.dof() as u32,
             held_count: held.len() as u32,
+            corners: 1,
             ..PlanHeader::default()
         };
         for (to, joint) in header.held_positions.iter_mut().zip(held) {
@@ -234,4 +236,29 @@ pub(crate) fn next(events: &Receiver<PlanEvent>, id: PlanId) -> (EventKind, Reas
         }
     }
     panic!("no event of plan {id}");
+}
+
+/// The telemetry that comes next.
+pub(crate) fn newest(telemetry: &Receiver<Telemetry>) -> Telemetry {
+    while telemetry.receive().unwrap().is_some() {}
+    let end = Instant::now() + Duration::from_secs(5);
+    while Instant::now() < end {
+        if let Some(newest) = telemetry.newest().unwrap() {
+            return newest.value;
+        }
+        thread::sleep(Duration::from_millis(1));
+    }
+    panic!("no telemetry");
+}
+
+/// Its exit code; none where a signal ended it.
+pub(crate) fn wait(child: &mut Child) -> Option<i32> {
+    let end = Instant::now() + Duration::from_secs(20);
+    while Instant::now() < end {
+        if let Some(status) = child.try_wait().expect("known") {
+            return status.code();
+        }
+        thread::sleep(Duration::from_millis(5));
+    }
+    panic!("it does not end");
 }

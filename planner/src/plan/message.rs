@@ -47,6 +47,7 @@ impl Plan {
                 Profile::Velocity => Interpolation::Linear.wire(),
                 Profile::Acceleration => Interpolation::Cubic.wire(),
             },
+            corners: u32::from(self.profile == Profile::Velocity),
             ..PlanHeader::default()
         };
         for (slot, held) in header.held_positions.iter_mut().zip(&self.held) {

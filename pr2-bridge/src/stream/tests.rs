@@ -3,8 +3,18 @@
 use super::*;
 
 const MS: u64 = 1_000_000;
-const RULES: Rules =
-    Rules { delay_ns: 60 * MS, timeout_ns: 20 * MS, stop_acceleration: 4.0, start_tolerance: 0.02 };
+/// The PR2's forearm and wrist turn without end.
+const TURNS: [bool; 8] = [false, false, false, false, true, false, true, false];
+
+fn rules() -> Rules {
+    Rules {
+        delay_ns: 60 * MS,
+        timeout_ns: 20 * MS,
+        stop_acceleration: 4.0,
+        start_tolerance: 0.02,
+        continuous: Continuous::new(TURNS),
+    }
+}
 
 fn setpoint(sequence: u64, q: f64, v: f64) -> Setpoint {
     let mut s = <Setpoint as bytemuck::Zeroable>::zeroed();
@@ -19,7 +29,7 @@ fn setpoint(sequence: u64, q: f64, v: f64) -> Setpoint {
 
 #[test]
 fn messages_join_where_setpoints_end_and_come_to_rest() {
-    let mut stream = Stream::new(RULES);
+    let mut stream = Stream::new(rules());
     let mut messages = Vec::new();
     for k in 1..=100u64 {
         let s = setpoint(k, 1e-3 * k as f64, 1.0);
@@ -50,7 +60,7 @@ fn messages_join_where_setpoints_end_and_come_to_rest() {
 
 #[test]
 fn what_is_too_late_or_too_far_is_not_followed() {
-    let mut stream = Stream::new(RULES);
+    let mut stream = Stream::new(rules());
     stream.take(&setpoint(1, 0.1, 0.0), &[0.0; DOF]);
     assert!(!stream.follows() && stream.refused == 1);
     // It says that it waits, so that the executor's setpoints come to the arm.
@@ -102,7 +112,7 @@ impl Controller {
 
 #[test]
 fn following_begins_without_a_jump() {
-    let mut stream = Stream::new(RULES);
+    let mut stream = Stream::new(rules());
     let mut controller = Controller { segments: Vec::new() };
     // The controller holds at 0, the arm is measured a little beside it.
     let (mut before, mut fastest) = (0.0, 0.0f64);
@@ -122,7 +132,7 @@ fn following_begins_without_a_jump() {
 #[test]
 fn missed_deadlines_are_no_jump() {
     for missed in [0, 1, 5, 20] {
-        let mut stream = Stream::new(RULES);
+        let mut stream = Stream::new(rules());
         let mut controller = Controller { segments: Vec::new() };
         let (mut deadline, mut q, mut speed) = (1000 * MS, 0.005, 0.0);
         let mut steepest: f64 = 0.0;
@@ -156,7 +166,7 @@ fn missed_deadlines_are_no_jump() {
 
 #[test]
 fn what_came_too_late_is_told_until_it_follows_again() {
-    let mut stream = Stream::new(RULES);
+    let mut stream = Stream::new(rules());
     let mut measured = [0.0; DOF];
     for k in 1..=20 {
         stream.take(&setpoint(k, 1e-3 * k as f64, 1.0), &measured);
@@ -180,7 +190,7 @@ fn what_came_too_late_is_told_until_it_follows_again() {
 
 #[test]
 fn standing_still_sends_one_message_and_ceasing_lets_go() {
-    let mut stream = Stream::new(RULES);
+    let mut stream = Stream::new(rules());
     let mut count = 0;
     for k in 1..=100u64 {
         stream.take(&setpoint(k, 0.0, 0.0), &[0.0; DOF]);
@@ -191,4 +201,41 @@ fn standing_still_sends_one_message_and_ceasing_lets_go() {
     assert_eq!(count, 1);
     assert!(stream.stopped(1120 * MS).is_none() && stream.follows());
     assert!(stream.stopped(1121 * MS) == Some(Stop::Ceased) && !stream.follows());
+}
+
+/// An arm whose driver tells the angle of a joint that turns without end as another one than the
+/// setpoints': they are followed where the arm is, not a whole turn away.
+#[test]
+fn whole_turns_are_no_way_to_go() {
+    for (joint, begins) in [(4, true), (6, true), (0, false)] {
+        let mut stream = Stream::new(rules());
+        let mut measured = [0.0; DOF];
+        measured[joint] = -3.0 * core::f64::consts::TAU + 0.01;
+        for k in 1..=20u64 {
+            let mut s = setpoint(k, 0.0, 0.0);
+            s.positions[joint] = 1e-3 * k as f64;
+            stream.take(&s, &measured);
+        }
+        assert_eq!(stream.follows(), begins, "joint {joint}");
+        let message = stream.message(1020 * MS);
+        assert_eq!(message.is_some(), begins, "joint {joint}");
+        for point in message.iter().flat_map(|m| &m.points) {
+            assert!((point.q[joint] - measured[joint]).abs() < 0.02, "joint {joint}: {point:?}");
+        }
+    }
+}
+
+/// Another executor's setpoints are not answered by the numbers of the one before it.
+#[test]
+fn another_executor_hears_nothing_of_the_first_ones_setpoints() {
+    let mut stream = Stream::new(rules());
+    for k in 5000..5100u64 {
+        stream.take(&setpoint(k, 0.0, 0.0), &[0.0; DOF]);
+    }
+    assert_eq!(stream.in_force(6170 * MS).map(|(sequence, _)| sequence), Some(5099));
+    let mut first = setpoint(1, 0.0, 0.0);
+    first.deadline_ns = 6200 * MS;
+    stream.take(&first, &[0.0; DOF]);
+    assert_eq!(stream.in_force(6210 * MS), None, "none of its own is in force yet");
+    assert_eq!(stream.in_force(6270 * MS).map(|(sequence, _)| sequence), Some(1));
 }

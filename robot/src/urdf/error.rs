@@ -92,7 +92,7 @@ pub enum UrdfError {
     BadLimits {
         /// The joint.
         joint: String,
-        /// `hard`, `soft`, `velocity` or `acceleration`.
+        /// `hard`, `soft`, `velocity`, `acceleration` or `jerk`.
         what: &'static str,
         /// Lower end.
         lower: f64,

@@ -111,7 +111,7 @@ pub enum JointKind {
     Prismatic,
 }
 
-/// `<limit>` of a joint. [rad, rad/s, rad/s²; m for prismatic joints]
+/// `<limit>` of a joint. [rad, rad/s, rad/s², rad/s³; m for prismatic joints]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HardLimits {
     /// Lower end; −∞ for continuous joints.
@@ -122,6 +122,8 @@ pub struct HardLimits {
     pub velocity: f64,
     /// Largest acceleration, where the URDF has one.
     pub acceleration: Option<f64>,
+    /// Largest jerk, where the URDF has one.
+    pub jerk: Option<f64>,
 }
 
 /// `<safety_controller>` of a joint.

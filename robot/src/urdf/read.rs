@@ -237,13 +237,13 @@ fn read_limits(
     if limit.velocity < 0.0 {
         return Err(bad("velocity", -limit.velocity, limit.velocity));
     }
-    if let Some(a) = facts.acceleration
-        && !(a > 0.0 && a.is_finite())
-    {
-        return Err(bad("acceleration", -a, a));
+    let JointFacts { acceleration, jerk, .. } = *facts;
+    for (what, most) in [("acceleration", acceleration), ("jerk", jerk)] {
+        if let Some(most) = most.filter(|most| !(*most > 0.0 && most.is_finite())) {
+            return Err(bad(what, -most, most));
+        }
     }
-    let (velocity, acceleration) = (limit.velocity, facts.acceleration);
-    Ok(Some(HardLimits { lower, upper, velocity, acceleration }))
+    Ok(Some(HardLimits { lower, upper, velocity: limit.velocity, acceleration, jerk }))
 }
 
 fn read_safety(

@@ -1,7 +1,8 @@
 //! What `urdf-rs` does not tell: which attributes the text really has.
 //!
 //! `urdf-rs` fills a missing `<limit>` and missing soft limits with zeros, drops words that are
-//! not numbers from vectors, and ignores `acceleration` in files that do not declare URDF 1.2.
+//! not numbers from vectors, and ignores `acceleration` and `jerk` in files that do not declare URDF
+//! 1.2.
 //! A second, shallow reading of the same text restores what matters.
 
 use std::collections::HashMap;
@@ -24,6 +25,8 @@ pub(crate) struct JointFacts {
     pub(crate) has_range: bool,
     /// `acceleration` of `<limit>`. [rad/s²] or [m/s²]
     pub(crate) acceleration: Option<f64>,
+    /// `jerk` of `<limit>`. [rad/s³] or [m/s³]
+    pub(crate) jerk: Option<f64>,
     /// At least one soft limit is there.
     pub(crate) has_soft_range: bool,
     /// `k_position` of `<safety_controller>` is there.
@@ -98,6 +101,13 @@ pub(crate) fn joint_facts(text: &str) -> Result<HashMap<String, JointFacts>, Str
     }
 }
 
+/// A number that `<limit>` may have.
+fn number(element: &BytesStart<'_>, name: &str) -> Result<Option<f64>, String> {
+    let text = attribute(element, name)?;
+    let wrong = |text| format!("{name}=\"{text}\" of <limit> is not a number");
+    text.map(|text| text.trim().parse().map_err(|_| wrong(text))).transpose()
+}
+
 fn read_joint_child(
     element: &BytesStart<'_>,
     name: &str,
@@ -108,13 +118,8 @@ fn read_joint_child(
             facts.has_limit = true;
             facts.has_range =
                 attribute(element, "lower")?.is_some() || attribute(element, "upper")?.is_some();
-            if let Some(text) = attribute(element, "acceleration")? {
-                let value = text
-                    .trim()
-                    .parse()
-                    .map_err(|_| format!("acceleration=\"{text}\" of <limit> is not a number"))?;
-                facts.acceleration = Some(value);
-            }
+            facts.acceleration = number(element, "acceleration")?;
+            facts.jerk = number(element, "jerk")?;
         }
         "safety_controller" => {
             facts.has_soft_range = attribute(element, "soft_lower_limit")?.is_some()

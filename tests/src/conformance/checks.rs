@@ -1,5 +1,7 @@
 //! What the executor relies on in an endpoint, rule by rule.
 
+use core::f64::consts::TAU;
+
 use nullsweep_executor::Hardware;
 use nullsweep_ipc_types::ports::PortError;
 use nullsweep_ipc_types::{JointStates, status};
@@ -78,6 +80,11 @@ pub fn checks<H: Hardware, C: Clock>() -> Vec<Check<H, C>> {
         Check { moves: true, ..check("follow", "each joint follows, and no other moves", follow) },
         check("watchdog", "when setpoints cease it stops by itself, and says so", watchdog),
         check("again", "after a stop it follows setpoints that begin where it is", again),
+        check("late", "it begins also with an executor that has counted for long", late),
+        Check {
+            dares: true,
+            ..check("turns", "whole turns of a continuous joint are no way to go", turns)
+        },
         Check {
             dares: true,
             ..check("refuse", "after a stop it follows none from afar, and says so", refuse)
@@ -207,7 +214,16 @@ fn answer<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, _: &Terms) -> Result<(), B
     rig.state()?;
     let command = rig.at(rig.measured());
     rig.keep(&command, ms(200))?;
-    let (sent, told) = (rig.sequence, rig.newest.map_or(0, |s| s.setpoint_sequence));
+    let mut told = 0;
+    for _ in 0..ms(100) {
+        rig.cycle(Some(&command))?;
+        let next = rig.newest.map_or(0, |s| s.setpoint_sequence);
+        if next < told {
+            return broken(format!("after setpoint {told} it tells number {next}"));
+        }
+        told = next;
+    }
+    let sent = rig.sequence;
     if told > sent {
         return broken(format!("it tells setpoint {told}, {sent} were sent"));
     }
@@ -304,6 +320,57 @@ fn again<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<()
         return broken("it still says that setpoints ceased".into());
     }
     rig.near(&q, terms.tolerance, "after it was taken over")
+}
+
+fn late<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<(), Broken> {
+    rig.state()?;
+    let command = rig.at(rig.measured());
+    rig.keep(&command, ms(100))?;
+    rig.cease(terms)?;
+    rig.sequence += 10_000_000;
+    let (before, q) = (rig.sequence, rig.measured());
+    let command = rig.at(q);
+    rig.keep(&command, ms(300))?;
+    let told = rig.newest.map_or(0, |s| s.setpoint_sequence);
+    let follows = !rig.has(status::SETPOINT_TIMEOUT) && told > before;
+    let stays = rig.near(&q, terms.tolerance, "after it was taken over");
+    // The rules that come next count anew, whatever was found.
+    for _ in 0..ms(300) {
+        rig.cycle(None)?;
+    }
+    rig.sequence = 0;
+    if follows {
+        stays
+    } else {
+        broken(format!("from setpoint {before} on it tells number {told}"))
+    }
+}
+
+fn turns<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<(), Broken> {
+    let arm = rig.arm.clone();
+    for j in (0..arm.dof()).filter(|j| arm.limits()[*j].continuous) {
+        let name = &arm.joint_names()[j];
+        rig.state()?;
+        for turns in [-1.0, 2.0] {
+            let here = rig.at(rig.measured());
+            rig.keep(&here, ms(100))?;
+            rig.cease(terms)?;
+            let begins = rig.measured();
+            let mut command = rig.at(begins);
+            command.q[j] += turns * TAU;
+            for _ in 0..ms(300) {
+                rig.cycle(Some(&command))?;
+                // What begins to turn is not waited for.
+                rig.near(&begins, terms.tolerance, &format!("while {name} is {turns} turns away"))?;
+            }
+            if rig.has(status::SETPOINT_TIMEOUT) {
+                return broken(format!("it does not follow where {name} is {turns} turns away"));
+            }
+            // What begins next has its own turns.
+            rig.cease(terms)?;
+        }
+    }
+    Ok(())
 }
 
 fn refuse<H: Hardware, C: Clock>(rig: &mut Rig<H, C>, terms: &Terms) -> Result<(), Broken> {

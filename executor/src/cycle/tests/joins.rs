@@ -101,6 +101,48 @@ fn bang_bang_begins_and_ends_where_the_arm_stands() {
     }
 }
 
+/// A straight plan without leave for corners is as smooth as a curve, also where it begins.
+#[test]
+fn without_leave_for_corners_a_straight_plan_begins_only_at_its_own_speed() {
+    let guard = pr2();
+    let step = 0.99 * guard.velocity_tolerance(0);
+    let from = moved(HOME, 0, 0.2);
+    // Joint 0 at 0.4 rad/s, then slower and slower.
+    let (mut q, mut points, mut speed) = (from, vec![(0, from)], 0.4f64);
+    while speed > 0.0 {
+        q[0] += speed * 5e-3;
+        points.push((points.len() as u64 * 5 * MS, q));
+        speed -= step;
+    }
+    let coast = |number, at: Option<usize>| {
+        plan_with(&guard, number, &points, |h, _| {
+            h.corners = 0;
+            if let Some(knot) = at {
+                h.join_rule = JoinRule::AtKnot.wire();
+                (h.join_plan, h.join_knot) = (id(1), knot as u32);
+            }
+        })
+    };
+    for (running, fits) in [(0.4, true), (0.3, false)] {
+        let mut sim = Sim::holding(guard);
+        let there = (0.2 / running * 1e3) as u64 * MS;
+        let line = [(0, HOME), (there, from), (2 * there, moved(from, 0, 0.2))];
+        only(&sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line)), Accepted);
+        let event = sim.offer(coast(2, Some(1)));
+        if fits {
+            only(&event, Accepted);
+            sim.run_until(Mode::Hold, 2000);
+            assert_eq!(sim.story(2), [Accepted, Started, Finished]);
+        } else {
+            let why = only(&event, Rejected).why;
+            assert_eq!((why.reason, why.joint), (Reason::Start, 0), "{why}");
+        }
+    }
+    let mut sim = Sim::new(guard);
+    sim.stand_at(from);
+    assert_eq!(only(&sim.offer(coast(3, None)), Rejected).why.reason, Reason::Start);
+}
+
 /// A first knot at a soft limit while the arm holds a little further inside: what the way there
 /// could not keep the braking margin on is refused, everything else arrives.
 #[test]
