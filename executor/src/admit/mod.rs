@@ -16,8 +16,6 @@ use crate::interpolate::{PlanKnot, reach, top_acceleration, top_speed};
 use crate::total::{greater, within};
 use crate::{JointVector, MAX_DOF};
 
-/// Plan times are whole nanoseconds in an `f64`. \[ns\]
-const LONGEST_NS: u64 = 1 << 53;
 /// A planner rounds its times to whole nanoseconds, so a segment may be this much too short. \[s\]
 const ROUNDING_S: f64 = 1e-9;
 /// What a planner's acceleration may exceed its limit by, as a share of it.
@@ -314,17 +312,17 @@ fn read(knots: &[Knot], joints: usize) -> Result<Vec<PlanKnot>, Rejection> {
                 *to = from;
             }
             // A bound that holds also for joints that turn without end.
-            if !(own.q[j].abs() <= Guard::FARTHEST) {
+            if !(own.q[j].abs() <= Knot::FARTHEST) {
                 let far = Rejection::new(Reason::SoftLimit).knot(i).joint(j);
-                return Err(far.value(own.q[j], Guard::FARTHEST.copysign(own.q[j])));
+                return Err(far.value(own.q[j], Knot::FARTHEST.copysign(own.q[j])));
             }
         }
         let order = Rejection::new(Reason::TimeOrder).knot(i);
         match read.last() {
             None if own.time != 0.0 => return Err(order.value(own.time, 0.0)),
             Some(last) if own.time <= last.time => return Err(order.value(own.time, last.time)),
-            _ if knot.time_from_start_ns > LONGEST_NS => {
-                return Err(order.value(own.time, LONGEST_NS as f64));
+            _ if knot.time_from_start_ns > Knot::LATEST_NS => {
+                return Err(order.value(own.time, Knot::LATEST_NS as f64));
             }
             _ => read.push(own),
         }

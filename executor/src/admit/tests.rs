@@ -4,7 +4,6 @@ use nullsweep_ipc_types::{Interpolation, JoinRule, Knot, MAX_KNOTS, PlanHeader, 
 use proptest::prelude::*;
 
 use super::{Held, Join, Rejection, ValidPlan, admit};
-use crate::guard::Guard;
 use crate::guard::tests::pr2;
 use crate::interpolate::{reach, top_speed};
 use crate::testing::{HOME, MS, held, message, moved, rules, seal};
@@ -255,7 +254,7 @@ fn no_number_passes_a_bound_that_it_does_not_keep() {
                     let speed = top_speed(&pair[0], &pair[1], *kind, j);
                     assert!(speed <= guard.joints[j].velocity(), "{kind}, joint {joint}: {odd}");
                     let (low, high) = reach(&pair[0], &pair[1], *kind, j);
-                    assert!(low >= -Guard::FARTHEST && high <= Guard::FARTHEST, "{kind}: {odd}");
+                    assert!(low >= -Knot::FARTHEST && high <= Knot::FARTHEST, "{kind}: {odd}");
                 }
             }
         }

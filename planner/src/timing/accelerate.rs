@@ -38,9 +38,11 @@ pub struct Rest {
 
 impl Rest {
     /// Brakes on the plan's path from its knot on. While the plan itself leaves no reserve for
-    /// braking, it is followed exactly. `None` if the plan has no such knot.
+    /// braking, it is followed exactly. `None` if the plan has no such knot, or cannot be gone
+    /// through ([`Plan::check_bounds`]).
     #[must_use]
     pub fn after(plan: &Plan, knot: usize, limits: &Limits) -> Option<Self> {
+        plan.check_bounds().ok()?;
         let knots = plan.knots.get(knot..)?;
         let first = knots.first()?;
         let stands = |k: &PlanKnot| k.v == JointVector::default();
@@ -74,7 +76,8 @@ impl Rest {
     pub fn then(&self, plan: Plan) -> Plan {
         let start = self.knots.last().map_or(0, |k| k.time_ns);
         let rest = plan.knots.iter().skip(1);
-        let later = rest.map(|k| PlanKnot { time_ns: k.time_ns + start, ..*k });
+        let late = |k: &PlanKnot| k.time_ns.saturating_add(start);
+        let later = rest.map(|k| PlanKnot { time_ns: late(k), ..*k });
         let knots = self.knots.iter().copied().chain(later).collect();
         Plan { knots, ..plan }
     }
