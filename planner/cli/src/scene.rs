@@ -1,7 +1,6 @@
 //! The scan that a command works on, from files or simulated, in the floor frame.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -16,6 +15,7 @@ use nullsweep_surface::{
 
 use crate::advice;
 use crate::bars::Bars;
+use crate::numbers::{Numbers, finite, not_negative, positive};
 
 /// How the scans stand and what of them is swept.
 #[derive(Debug, Args)]
@@ -27,13 +27,13 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, conflicts_with = "sensor_pose")]
     up: Option<Numbers<3>>,
     /// Height of the sensor above what the object stands on. [m]
-    #[arg(long, value_name = "M", requires = "up")]
+    #[arg(long, value_name = "M", requires = "up", value_parser = finite)]
     sensor_height: Option<f64>,
     /// Height above the floor of what the object stands on; above 0 it becomes a table. [m]
-    #[arg(long, value_name = "M", default_value_t = 0.0)]
+    #[arg(long, value_name = "M", default_value_t = 0.0, value_parser = not_negative)]
     support_height: f64,
     /// Factor from the file's unit to metres: 0.001 for millimetres.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = positive)]
     scale: f64,
     /// Keep only this box of the floor frame as the surface to sweep, the rest stays an obstacle:
     /// xmin,ymin,zmin,xmax,ymax,zmax.
@@ -49,28 +49,6 @@ pub(super) enum Demo {
     ChairSeat,
     /// A ride-on toy car.
     BobbyCar,
-}
-
-/// N comma-separated finite numbers.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
-
-impl<const N: usize> FromStr for Numbers<N> {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let values: Vec<f64> = text
-            .split(',')
-            .map(|part| part.trim().parse::<f64>().map_err(|e| format!("`{part}`: {e}")))
-            .collect::<Result<_, _>>()?;
-        let numbers: [f64; N] =
-            values.try_into().map_err(|v: Vec<f64>| format!("{} numbers, not {N}", v.len()))?;
-        if numbers.iter().all(|v| v.is_finite()) {
-            Ok(Self(numbers))
-        } else {
-            Err("the numbers must be finite".into())
-        }
-    }
 }
 
 /// Reads and joins the scans, or simulates `demo`'s with the noise of `seed`, and cleans them.

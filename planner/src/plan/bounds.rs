@@ -33,7 +33,7 @@ fn bounded(path: Trajectory<'_>, of: &'static str) -> Result<f64, PlanError> {
     let mut moved = 0.0;
     for (knot, here) in path.knots.iter().enumerate() {
         let numbers = || here.q.iter().chain(&here.v).chain(here.line.iter().flatten());
-        if let Some(&value) = numbers().find(|x| !(x.abs() <= GREATEST)) {
+        if let Some(&value) = numbers().find(|x| !(-GREATEST..=GREATEST).contains(*x)) {
             return Err(PlanError::NotFinite { knot, of, value });
         }
         let before = knot.checked_sub(1).map(|k| path.knots[k].time_ns);
