@@ -207,9 +207,11 @@ impl Mounted<'_> {
 mod tests {
     use super::*;
 
+    type Spoil = fn(&mut Tool);
+
     #[test]
     fn a_tool_that_cannot_be_is_refused_by_its_field() {
-        let spoil: [(&str, fn(&mut Tool)); 14] = [
+        let spoil: [(&str, Spoil); 14] = [
             ("length is 0 m", |t| t.length = 0.0),
             ("width is NaN m", |t| t.width = f64::NAN),
             ("thickness is -0.03 m", |t| t.thickness = -0.03),

@@ -69,8 +69,10 @@ mod tests {
         Plan::of(&robot, &arm, &Tool::default(), knots.collect())
     }
 
+    type Spoil = fn(&mut [PlanKnot]);
+
     /// Each spoils a path of three knots.
-    const SPOILT: [(&str, fn(&mut [PlanKnot])); 9] = [
+    const SPOILT: [(&str, Spoil); 9] = [
         ("knot 1", |k| k[1].q[2] = f64::NAN),
         ("knot 2", |k| k[2].v[0] = f64::INFINITY),
         ("knot 0", |k| k[0].line = Some([0.0, f64::NEG_INFINITY, 0.0])),

@@ -55,6 +55,19 @@ pub(crate) const CRATES: &[Crate] = &[
     ),
     with("executor", &["ipc-types", "robot"]),
     Crate { dir: "tests", may: May::ImportAll, dev: &[] },
+    with(
+        "tests/inputs",
+        &[
+            "planner",
+            "planner/gtsp",
+            "planner/surface",
+            "planner/collision",
+            "executor",
+            "robot",
+            "ipc-types",
+        ],
+    ),
+    with("fuzz", &["tests/inputs"]),
     with("pr2-bridge", &["ipc-types", "robot", "executor"]),
 ];
 

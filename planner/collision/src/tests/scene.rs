@@ -128,7 +128,8 @@ fn an_obstacle_may_have_any_shape_that_a_urdf_has() {
 #[test]
 fn a_tool_that_cannot_be_is_refused_by_both_checks() {
     let (robot, arm, tool) = pr2();
-    let spoil: [(&str, fn(&mut Tool)); 4] = [
+    type Spoil = fn(&mut Tool);
+    let spoil: [(&str, Spoil); 4] = [
         ("thickness is -0.03 m", |t| t.thickness = -0.03),
         ("width is NaN m", |t| t.width = f64::NAN),
         ("approach is [0.0, 0.0, 0.0]", |t| t.approach = [0.0; 3]),
