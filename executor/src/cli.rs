@@ -1,32 +1,25 @@
-//! The command line: `executor run`, `executor ctl`.
+//! The command line: `executor run`, `executor replay`; `executor ctl` is next door.
 
 use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand};
-use nullsweep_ipc_types::ports::Ipc;
-use nullsweep_ipc_types::{
-    CommandKind, Fault, HISTOGRAM_BUCKETS, Mode, Response, Verdict, bucket_upper_ns, service,
-};
+use nullsweep_ipc_types::{HISTOGRAM_BUCKETS, bucket_upper_ns};
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::flag;
 
 use crate::admit::Rules;
+use crate::alarm::Alarm;
+use crate::ctl::{self, CtlArgs};
 use crate::executor::{Config, Summary, quantile_ns, run};
 use crate::guard::Guard;
 use crate::log::{Log, last_words};
+use crate::pidfile::{PidFile, PidFileError};
 use crate::record::replay;
 use crate::rt::probe_cpu;
-
-/// How long `ctl` waits for an answer.
-const ANSWER_WITHIN: Duration = Duration::from_secs(1);
+use crate::system::SystemArgs;
 
 /// Real-time executor: streams joint setpoints of published plans to a hardware endpoint.
 #[derive(Debug, Parser)]
@@ -42,7 +35,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Run until SIGINT or SIGTERM, then stop on the path and disable the motors.
+    /// Run until SIGINT or SIGTERM, then stop on the path and disable the motors. SIGUSR1 stops on
+    /// the path, SIGUSR2 also disables the motors.
     Run(Box<RunArgs>),
     /// Send a command to a running executor.
     Ctl(CtlArgs),
@@ -51,16 +45,6 @@ enum Action {
         /// A file that `run --record` wrote.
         file: PathBuf,
     },
-}
-
-#[derive(Debug, Args)]
-struct SystemArgs {
-    /// The robot's name in the services' names.
-    #[arg(long, default_value = service::DEFAULT_ROBOT)]
-    robot_name: String,
-    /// Folder that isolates this system from others on the machine.
-    #[arg(long, value_name = "PATH")]
-    ipc_root: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -126,37 +110,6 @@ struct RunArgs {
     record_mib: u64,
 }
 
-#[derive(Debug, Args)]
-struct CtlArgs {
-    #[command(flatten)]
-    system: SystemArgs,
-    #[command(subcommand)]
-    order: Ctl,
-}
-
-#[derive(Clone, Copy, Debug, Subcommand)]
-enum Ctl {
-    /// Slow down to a stand-still on the path and keep the plan.
-    Pause,
-    /// Go on; after a halt or a disable, allow motion again.
-    Resume,
-    /// Ramp the speed to this percentage.
-    Speed {
-        /// 0 to 100.
-        percent: f64,
-    },
-    /// Slow down on the path, drop the plan, hold.
-    Stop {
-        /// Then ask the endpoint to disable its motors.
-        #[arg(long)]
-        disable: bool,
-    },
-    /// Clear a latched fault; the arm then holds where it is measured.
-    Reset,
-    /// Tell mode, fault, plan and speed.
-    Status,
-}
-
 /// The command line was wrong: ends with clap's own code.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
@@ -179,7 +132,7 @@ where
     };
     let result = match cli.command {
         Action::Run(args) => run_command(&args),
-        Action::Ctl(args) => ctl_command(&args),
+        Action::Ctl(args) => ctl::command(&args),
         Action::Replay { file } => replay_command(&file),
     };
     match result {
@@ -212,23 +165,28 @@ fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn run_logged(args: &RunArgs) -> anyhow::Result<ExitCode> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGTERM, SIGINT, SIGHUP] {
-        // The second signal ends the process at once, the first one stops the arm on its path.
-        flag::register_conditional_shutdown(signal, 1, stop.clone())?;
-        flag::register(signal, stop.clone())?;
-    }
+    let alarm = Alarm::install()?;
     let arm = arm(args)?;
     let config = config(args, &arm)?;
     tracing::info!(
-        "executor for robot `{}`: {} joints from {} to {}, {} Hz",
+        "executor for robot `{}`: {} joints from {} to {}, {} Hz, process {}",
         config.robot_name,
         arm.dof(),
         arm.spec().base,
         arm.spec().tip,
-        args.rate
+        args.rate,
+        std::process::id()
     );
-    let summary = run(&arm, &config, &stop)?;
+    // After the handlers: who finds the file may send signals.
+    let _here = match PidFile::claim(&config.robot_name, config.ipc_root.as_deref()) {
+        Ok(file) => Some(file),
+        Err(e @ PidFileError::Taken { .. }) => return Err(e.into()),
+        Err(e @ PidFileError::Write { .. }) => {
+            tracing::warn!("`ctl stop` needs --pid {}: {e}", std::process::id());
+            None
+        }
+    };
+    let summary = run(&arm, &config, &alarm)?;
     tracing::info!("{}", Told(summary));
     Ok(ExitCode::SUCCESS)
 }
@@ -313,46 +271,6 @@ fn replay_command(file: &Path) -> anyhow::Result<ExitCode> {
         replayed.cycles, replayed.setpoints, replayed.torn
     )?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn ctl_command(args: &CtlArgs) -> anyhow::Result<ExitCode> {
-    let (kind, value) = match args.order {
-        Ctl::Pause => (CommandKind::Pause, 0.0),
-        Ctl::Resume => (CommandKind::Resume, 0.0),
-        Ctl::Speed { percent } => (CommandKind::Speed, percent / 100.0),
-        Ctl::Stop { disable: false } => (CommandKind::Stop, 0.0),
-        Ctl::Stop { disable: true } => (CommandKind::StopAndDisable, 0.0),
-        Ctl::Reset => (CommandKind::Reset, 0.0),
-        Ctl::Status => (CommandKind::Status, 0.0),
-    };
-    let ipc = Ipc::open(&args.system.robot_name, args.system.ipc_root.as_deref())?;
-    let response = ipc.command_client()?.call(kind, value, ANSWER_WITHIN)?;
-    // Done is done, also where the answer cannot be shown: the exit code tells it too.
-    let _ = writeln!(std::io::stdout(), "{}", Answer(&response));
-    let accepted = Verdict::from_wire(response.verdict) == Some(Verdict::Accepted);
-    Ok(if accepted { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-/// A response in words.
-struct Answer<'a>(&'a Response);
-
-impl std::fmt::Display for Answer<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let response = self.0;
-        let unknown = "unknown";
-        let verdict = Verdict::from_wire(response.verdict).map_or(unknown, Verdict::text);
-        let mode = Mode::from_wire(response.mode).map_or(unknown, Mode::text);
-        write!(f, "{verdict}: {mode}")?;
-        match Fault::from_wire(response.fault) {
-            Some(Fault::None) => {}
-            Some(fault) => write!(f, ", {fault}")?,
-            None => write!(f, ", fault {}", response.fault)?,
-        }
-        if response.plan.is_some() {
-            write!(f, ", plan {} at knot {}", response.plan, response.knot)?;
-        }
-        write!(f, ", speed {:.0} %", response.speed_scale * 100.0)
-    }
 }
 
 /// A quantile in words.

@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::thread;
-use std::time::Duration;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::ports::{Ipc, IpcError, now_ns};
 use nullsweep_ipc_types::{HISTOGRAM_BUCKETS, MAX_HELD_JOINTS, Mode, bucket_upper_ns};
 use nullsweep_robot::{Arm, JointKind};
 
 use crate::admit::Rules;
-use crate::cycle::{Ask, Order};
+use crate::alarm::Alarm;
 use crate::driver::Driver;
 use crate::guard::Guard;
 use crate::hardware::{Hardware, IpcHardware};
@@ -23,8 +23,6 @@ use crate::slots::Slots;
 use crate::words::Words;
 use crate::worker::Worker;
 
-/// The ticket of the shutdown order, which nobody waits for.
-const SHUTDOWN_TICKET: u64 = u64::MAX;
 /// Cycles that go on after a shutdown's stand-still, so that the endpoint hears the disable.
 const AFTERGLOW: u32 = 50;
 /// Least cycles from the first Hold until the loop counts as armed: by then every port was used.
@@ -33,6 +31,10 @@ const WARM_UP: u32 = 200;
 const HELPERS: u8 = 5;
 /// How long a shutdown may take before the threads are left behind.
 const SHUTDOWN_WITHIN: Duration = Duration::from_secs(5);
+/// How long opening the ports may take, whatever is in the way.
+const OPEN_WITHIN: Duration = Duration::from_secs(15);
+/// How long the threads may take to end.
+const LEAVE_WITHIN: Duration = Duration::from_secs(2);
 
 /// How an executor runs.
 #[derive(Clone, Debug)]
@@ -84,6 +86,15 @@ pub enum ExecutorError {
     /// A thread panicked.
     #[error("the {0} thread ended unexpectedly")]
     Died(&'static str),
+    /// A thread does not end, or has not opened its ports.
+    #[error(
+        "the {thread} thread hangs: where that is at the start, look for files of length 0 in \
+         /dev/shm and for processes of this robot that are stopped"
+    )]
+    Hangs {
+        /// Its name.
+        thread: &'static str,
+    },
     /// The loop did not come to a stand-still.
     #[error("the loop did not stop within {} s", .0.as_secs())]
     Stuck(Duration),
@@ -127,94 +138,148 @@ pub fn quantile_ns(histogram: &[u32; HISTOGRAM_BUCKETS], share: f64) -> Option<u
     None
 }
 
-/// Runs an executor for `arm` until `stop` is set, then stops on the path, disables the motors,
-/// tells every plan's end, and returns.
+/// Runs an executor for `arm` until `alarm` shuts it down, then stops on the path, disables the
+/// motors, tells every plan's end, and returns. Whatever hangs is left behind.
 ///
 /// # Errors
-/// When a port is taken or cannot be opened, or a thread died.
-pub fn run(arm: &Arm, config: &Config, stop: &AtomicBool) -> Result<Summary, ExecutorError> {
+/// When another executor runs, a port is taken or cannot be opened, or a thread died or hangs.
+pub fn run(arm: &Arm, config: &Config, alarm: &Alarm) -> Result<Summary, ExecutorError> {
     rt::keep_heap();
     let rules = rules(arm, config)?;
-    let slots = Arc::new(Slots::default());
-    let tape = config.record.as_ref().map(|_| Arc::new(Tape::default()));
-    let recorder = recorder(config, tape.as_ref())?;
-    let signs = Signs::default();
-    let Signs { done, down, .. } = &signs;
-    let open_ports = AtomicU32::new(0);
-    thread::scope(|scope| {
-        let worker = spawn(scope, "worker", || {
-            rt::raise(helper_priority(config));
-            let ipc = open(config)?;
-            let worker = Worker::open(&ipc, slots.clone(), rules, recorder)?;
-            open_ports.fetch_add(1, Ordering::Release);
-            worker.run(done);
-            Ok(())
-        })?;
-        let service = spawn(scope, "service", || {
-            rt::raise(helper_priority(config));
-            let ipc = open(config)?;
-            let journal = Journal::new(Words::of(arm, &config.robot_name, &config.guard));
-            let service = Service::open(&ipc, slots.clone(), arm.dof(), journal)?;
-            open_ports.fetch_add(1, Ordering::Release);
-            service.run(done);
-            Ok(())
-        })?;
-        // The loop comes last: whoever sees it hold can publish plans and command it.
-        while open_ports.load(Ordering::Acquire) < 2
-            && !worker.is_finished()
-            && !service.is_finished()
-        {
-            thread::sleep(Duration::from_millis(1));
+    let Slots { looping, worker, service } = Slots::default();
+    let (recorder, tape) = recorder(config)?.unzip();
+    let signs = Arc::new(Signs::default());
+    let worker = spawn("worker", config, &signs, move |config, signs| {
+        rt::raise(helper_priority(config));
+        let ipc = open(config)?;
+        let worker = Worker::open(&ipc, worker, rules, recorder)?;
+        signs.open.fetch_add(1, Ordering::Release);
+        worker.run(&signs.done);
+        Ok(())
+    })?;
+    let own = arm.clone();
+    let service = spawn("service", config, &signs, move |config, signs| {
+        rt::raise(helper_priority(config));
+        let ipc = open(config)?;
+        let journal = Journal::new(Words::of(&own, &config.robot_name, &config.guard));
+        let service = Service::open(&ipc, service, own.dof(), journal)?;
+        signs.open.fetch_add(1, Ordering::Release);
+        service.run(&signs.done);
+        Ok(())
+    })?;
+    let helpers = [worker, service];
+    let ended = || helpers.iter().any(JoinHandle::is_finished);
+    // The loop comes last: whoever sees it hold can publish plans and command it.
+    if !opened(&signs, 2, &|| alarm.is_shutting_down() || ended()) {
+        return unopened(&signs, alarm, None, helpers);
+    }
+    let own = alarm.clone();
+    let looping = spawn("loop", config, &signs, move |config, signs| {
+        // Before the first port, so that all their blocks are the pool's.
+        rt::enter_pool();
+        let ipc = open(config)?;
+        let hardware = IpcHardware::open(&ipc)?;
+        signs.open.fetch_add(1, Ordering::Release);
+        let mut driver = Driver::new(hardware, config.guard, looping);
+        driver.heed(own);
+        if let Some(tape) = tape {
+            driver.record(tape);
         }
-        let looping = spawn(scope, "loop", || {
-            // Before the first port, so that all their blocks are the pool's.
-            rt::enter_pool();
-            let ipc = open(config)?;
-            let hardware = IpcHardware::open(&ipc)?;
-            let mut driver = Driver::new(hardware, config.guard, slots.clone());
-            if let Some(tape) = tape {
-                driver.record(tape);
-            }
-            Ok(run_loop(driver, config, &signs))
-        })?;
+        Ok(run_loop(driver, config, signs))
+    })?;
+    let over = || ended() || looping.is_finished();
+    if !opened(&signs, 3, &|| alarm.is_shutting_down() || over()) {
+        return unopened(&signs, alarm, Some(looping), helpers);
+    }
+    let stops = watch(&signs, alarm, &looping, &over);
+    let result = end(&signs, Some(looping), helpers, LEAVE_WITHIN);
+    if stops { result } else { Err(ExecutorError::Stuck(SHUTDOWN_WITHIN)) }
+}
 
-        let mut asked = None;
-        loop {
-            thread::sleep(Duration::from_millis(5));
-            if signs.holds.load(Ordering::Acquire) && !signs.locked.load(Ordering::Relaxed) {
-                // The endpoint's memory too, which came after the loop's thread locked its own.
-                // What is denied here was denied there, which said so.
-                let _ = rt::lock_memory();
-                signs.locked.store(true, Ordering::Release);
-            }
-            let ended = worker.is_finished() || service.is_finished() || looping.is_finished();
-            if (stop.load(Ordering::Acquire) || ended) && asked.is_none() {
-                let ask = Ask { ticket: SHUTDOWN_TICKET, order: Order::Shutdown };
-                if slots.asks.push(ask).is_ok() {
-                    asked = Some(std::time::Instant::now());
-                }
-            }
-            let late = asked.is_some_and(|at| at.elapsed() > SHUTDOWN_WITHIN);
-            if down.load(Ordering::Acquire) || looping.is_finished() || late {
-                done.store(true, Ordering::Release);
-                let summary = joined("loop", looping);
-                joined("service", service)?;
-                joined("worker", worker)?;
-                return if late { Err(ExecutorError::Stuck(SHUTDOWN_WITHIN)) } else { summary };
+/// The end of a run whose ports were not all opened: asked for, or because of what went wrong.
+fn unopened(
+    signs: &Signs,
+    alarm: &Alarm,
+    looping: Option<Running<Summary>>,
+    helpers: [Running<()>; 2],
+) -> Result<Summary, ExecutorError> {
+    // Nothing moves yet: what still opens its ports need not be waited for.
+    match end(signs, looping, helpers, LEAVE_WITHIN / 10) {
+        Err(ExecutorError::Hangs { .. }) if alarm.is_shutting_down() => Ok(Summary::default()),
+        result => result,
+    }
+}
+
+/// Waits until so many threads have opened their ports, unless it is `over`; whether they have.
+fn opened(signs: &Signs, wanted: u32, over: &dyn Fn() -> bool) -> bool {
+    let start = Instant::now();
+    while signs.open.load(Ordering::Acquire) < wanted && !over() && start.elapsed() < OPEN_WITHIN {
+        thread::sleep(Duration::from_millis(1));
+    }
+    signs.open.load(Ordering::Acquire) >= wanted
+}
+
+/// Waits for the loop's end, and asks for it where another thread has ended. Whether it comes in time.
+fn watch(
+    signs: &Signs,
+    alarm: &Alarm,
+    looping: &Running<Summary>,
+    ended: &dyn Fn() -> bool,
+) -> bool {
+    let mut told: Option<Instant> = None;
+    while !looping.is_finished() {
+        thread::sleep(Duration::from_millis(5));
+        if signs.holds.load(Ordering::Acquire) && !signs.locked.load(Ordering::Relaxed) {
+            // The endpoint's memory too, which came after the loop's thread locked its own.
+            // What is denied here was denied there, which said so.
+            let _ = rt::lock_memory();
+            signs.locked.store(true, Ordering::Release);
+        }
+        if ended() {
+            alarm.shut_down();
+        }
+        if alarm.is_shutting_down() {
+            let told = told.get_or_insert_with(Instant::now);
+            if told.elapsed() > SHUTDOWN_WITHIN {
+                return false;
             }
         }
-    })
+    }
+    true
+}
+
+/// Has all threads end, and tells what the loop did or what was wrong.
+fn end(
+    signs: &Signs,
+    looping: Option<Running<Summary>>,
+    helpers: [Running<()>; 2],
+    limit: Duration,
+) -> Result<Summary, ExecutorError> {
+    signs.done.store(true, Ordering::Release);
+    let start = Instant::now();
+    let running = || {
+        looping.as_ref().is_some_and(|looping| !looping.is_finished())
+            || helpers.iter().any(|helper| !helper.is_finished())
+    };
+    while running() && start.elapsed() < limit {
+        thread::sleep(Duration::from_millis(1));
+    }
+    let summary = looping.map_or(Ok(Summary::default()), |looping| joined("loop", looping));
+    let [worker, service] = helpers;
+    joined("service", service)?;
+    joined("worker", worker)?;
+    summary
 }
 
 /// What the threads tell each other of a run's beginning and end.
 #[derive(Debug, Default)]
 struct Signs {
+    /// Threads whose ports are open.
+    open: AtomicU32,
     /// The loop has come to its first Hold.
     holds: AtomicBool,
     /// All memory that was there by then is locked.
     locked: AtomicBool,
-    /// The loop has come to its end.
-    down: AtomicBool,
     /// All threads shall end.
     done: AtomicBool,
 }
@@ -261,7 +326,6 @@ fn run_loop<H: Hardware>(mut driver: Driver<H>, config: &Config, signs: &Signs) 
     summary.pool_calls = pool.pool_calls;
     summary.failures = driver.failures();
     (summary.lateness, summary.compute) = driver.histograms();
-    signs.down.store(true, Ordering::Release);
     summary
 }
 
@@ -294,9 +358,9 @@ fn rules(arm: &Arm, config: &Config) -> Result<Rules, ExecutorError> {
     })
 }
 
-fn recorder(config: &Config, tape: Option<&Arc<Tape>>) -> Result<Option<Recorder>, ExecutorError> {
-    let (Some((folder, limit)), Some(tape)) = (&config.record, tape) else { return Ok(None) };
-    Recorder::new(tape.clone(), folder, *limit, config.guard)
+fn recorder(config: &Config) -> Result<Option<(Recorder, Tape)>, ExecutorError> {
+    let Some((folder, limit)) = &config.record else { return Ok(None) };
+    Recorder::new(folder, *limit, config.guard)
         .map(Some)
         .map_err(|error| ExecutorError::Record { folder: folder.clone(), error })
 }
@@ -305,17 +369,23 @@ fn open(config: &Config) -> Result<Ipc, IpcError> {
     Ipc::open(&config.robot_name, config.ipc_root.as_deref())
 }
 
-type Running<'scope, T> = thread::ScopedJoinHandle<'scope, Result<T, ExecutorError>>;
+type Running<T> = JoinHandle<Result<T, ExecutorError>>;
 
-fn spawn<'scope, T: Send + 'scope>(
-    scope: &'scope thread::Scope<'scope, '_>,
+fn spawn<T: Send + 'static>(
     name: &str,
-    run: impl FnOnce() -> Result<T, ExecutorError> + Send + 'scope,
-) -> std::io::Result<Running<'scope, T>> {
-    thread::Builder::new().name(name.into()).spawn_scoped(scope, run)
+    config: &Config,
+    signs: &Arc<Signs>,
+    run: impl FnOnce(&Config, &Signs) -> Result<T, ExecutorError> + Send + 'static,
+) -> std::io::Result<Running<T>> {
+    let (config, signs) = (config.clone(), signs.clone());
+    thread::Builder::new().name(name.into()).spawn(move || run(&config, &signs))
 }
 
-fn joined<T>(name: &'static str, thread: Running<'_, T>) -> Result<T, ExecutorError> {
+/// What a thread ended with; one that has not ended is left behind.
+fn joined<T>(name: &'static str, thread: Running<T>) -> Result<T, ExecutorError> {
+    if !thread.is_finished() {
+        return Err(ExecutorError::Hangs { thread: name });
+    }
     thread.join().map_err(|_| ExecutorError::Died(name))?
 }
 

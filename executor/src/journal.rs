@@ -57,6 +57,11 @@ impl Journal {
         }
     }
 
+    /// A signal has had the arm stop.
+    pub(crate) fn signal(now: &Snapshot) {
+        tracing::info!("stopped by a signal: mode {}", now.mode);
+    }
+
     /// What the loop is doing.
     pub(crate) fn report(&mut self, now: &Snapshot) {
         let (mode, fault) = (self.mode, self.fault);

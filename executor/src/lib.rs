@@ -2,15 +2,18 @@
 //!
 //! Three threads. The real-time thread runs [`cycle::step`] once a period and nothing else; the
 //! service thread answers commands and tells telemetry and events; the worker thread admits
-//! plans. Bounded lock-free queues lie between them.
+//! plans. Bounded wait-free queues lie between them.
 #![allow(
     clippy::neg_cmp_op_on_partial_ord,
     reason = "`!(x <= bound)` is how a NaN falls on the safe side"
 )]
 
 mod admit;
+mod alarm;
 mod cli;
+mod ctl;
 pub mod cycle;
+mod desk;
 mod driver;
 mod executor;
 mod guard;
@@ -20,12 +23,14 @@ mod interpolate;
 mod journal;
 mod log;
 mod path;
+mod pidfile;
 mod record;
 pub mod rt;
 mod service;
 mod slots;
 #[cfg(test)]
 mod swaps;
+mod system;
 #[cfg(test)]
 mod testing;
 mod total;
@@ -33,6 +38,7 @@ mod words;
 mod worker;
 
 pub use admit::{Held, Join, Rejection, Rules, ValidPlan, admit};
+pub use alarm::Alarm;
 pub use cli::main_with;
 pub use driver::Driver;
 pub use executor::{Config, ExecutorError, Summary, quantile_ns, run};
@@ -43,4 +49,4 @@ pub use nullsweep_robot::{JointVector, MAX_DOF};
 pub use path::{Path, Progress};
 pub use record::{ReplayError, Replayed, replay};
 pub use rt::PoolAllocator;
-pub use slots::{Report, Slots};
+pub use slots::{Claim, LoopEnd, Report, ServiceEnd, Slots, WorkerEnd};

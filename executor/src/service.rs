@@ -1,25 +1,23 @@
-//! The service thread: commands answered at once, events, telemetry. It never waits for anything
-//! but the loop's next cycle.
+//! The service thread: events, telemetry, and the desk where commands are answered. It never waits
+//! for anything.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use nullsweep_ipc_types::ports::{CommandServer, Ipc, IpcError, Sender, now_ns};
-use nullsweep_ipc_types::{
-    Command, CommandKind, Fault, MAX_JOINTS, Mode, PlanEvent, PlanId, Response, Telemetry, Verdict,
-};
+use nullsweep_ipc_types::ports::{Ipc, IpcError, Sender, now_ns};
+use nullsweep_ipc_types::{MAX_JOINTS, PlanEvent, Telemetry};
 
-use crate::cycle::{Ask, Event, Order, Refused, Reply, Snapshot};
+use crate::cycle::{Event, Refused, Snapshot};
+use crate::desk::Desk;
 use crate::driver::widen;
 use crate::journal::{Journal, WARN_EVERY};
-use crate::slots::{Report, Slots};
+use crate::slots::{Report, ServiceEnd};
 
 /// Pause between two rounds.
 const ROUND: Duration = Duration::from_micros(500);
-/// How long an answer of the loop is waited for.
-const ANSWER_WITHIN: Duration = Duration::from_millis(50);
+/// The same while somebody waits for the loop's answer.
+const SHORT_ROUND: Duration = Duration::from_micros(100);
 /// How long the last events stay readable after the end: a publisher that exits takes what was
 /// not yet read with it.
 const LINGER: Duration = Duration::from_millis(200);
@@ -27,14 +25,13 @@ const LINGER: Duration = Duration::from_millis(200);
 /// The ports and what was last told. Make it on the thread that runs it.
 #[derive(Debug)]
 pub(crate) struct Service {
-    slots: Arc<Slots>,
-    server: CommandServer,
+    slots: ServiceEnd,
+    desk: Desk,
     telemetry: Sender<Telemetry>,
     events: Sender<PlanEvent>,
     joint_count: usize,
     told: u64,
     snapshots: u64,
-    tickets: u64,
     newest: Option<Snapshot>,
     journal: Journal,
     /// Joint states refused for their stamps that were warned of, and when.
@@ -44,19 +41,18 @@ pub(crate) struct Service {
 impl Service {
     pub(crate) fn open(
         ipc: &Ipc,
-        slots: Arc<Slots>,
+        slots: ServiceEnd,
         joint_count: usize,
         journal: Journal,
     ) -> Result<Self, IpcError> {
         Ok(Self {
             slots,
-            server: ipc.command_server()?,
+            desk: Desk::new(ipc.command_server()?),
             telemetry: ipc.telemetry_sender()?,
             events: ipc.event_sender()?,
             joint_count,
             told: 0,
             snapshots: 0,
-            tickets: 0,
             newest: None,
             journal,
             refused: (0, None),
@@ -67,7 +63,7 @@ impl Service {
     pub(crate) fn run(mut self, done: &AtomicBool) {
         while !done.load(Ordering::Acquire) {
             self.round();
-            thread::sleep(ROUND);
+            thread::sleep(if self.desk.is_waiting() { SHORT_ROUND } else { ROUND });
         }
         let end = Instant::now() + LINGER;
         while Instant::now() < end {
@@ -77,16 +73,18 @@ impl Service {
     }
 
     fn round(&mut self) {
-        while let Some(event) = self.slots.events.pop() {
-            self.told += 1;
-            if let Err(e) = self.events.send(&on_wire(&event, self.told)) {
-                tracing::error!("plan event lost: {e}");
+        for from in &mut self.slots.events {
+            while let Ok(event) = from.pop() {
+                self.told += 1;
+                if let Err(e) = self.events.send(&on_wire(&event, self.told)) {
+                    tracing::error!("plan event lost: {e}");
+                }
+                self.journal.event(&event);
             }
-            self.journal.event(&event);
         }
         // Late listeners get the history also while nothing new happens.
         let _ = self.events.connect();
-        if let Some(report) = self.slots.reports.pop() {
+        while let Ok(report) = self.slots.reports.pop() {
             self.snapshots += 1;
             self.newest = Some(report.snapshot);
             self.journal.report(&report.snapshot);
@@ -96,14 +94,8 @@ impl Service {
                 tracing::warn!("telemetry lost: {e}");
             }
         }
-        let Self { server, slots, tickets, newest, .. } = self;
-        let answered = server.answer(|command| {
-            let response = respond(command, slots, tickets, *newest);
-            Journal::command(command, &response);
-            response
-        });
-        if let Err(e) = answered {
-            tracing::warn!("a command was not answered: {e}");
+        if let Err(e) = self.desk.round(&mut self.slots, self.newest) {
+            tracing::warn!("commands cannot be received: {e}");
         }
     }
 
@@ -149,58 +141,6 @@ fn refusal(refused: &Refused, new: u64) -> String {
         "{new} joint states refused: the last one's stamp is {seconds:.3} s {side} \
          CLOCK_MONOTONIC{epoch}; the endpoint must stamp by CLOCK_MONOTONIC"
     )
-}
-
-/// Asks the loop and waits for its answer: one or two cycles.
-fn respond(
-    command: &Command,
-    slots: &Slots,
-    tickets: &mut u64,
-    newest: Option<Snapshot>,
-) -> Response {
-    let Some(order) = order(command) else {
-        return response(Verdict::Unknown, newest);
-    };
-    *tickets += 1;
-    let ticket = *tickets;
-    if slots.asks.push(Ask { ticket, order }).is_err() {
-        return response(Verdict::Busy, newest);
-    }
-    let start = Instant::now();
-    while start.elapsed() < ANSWER_WITHIN {
-        while let Some(reply) = slots.replies.pop() {
-            if reply.ticket == ticket {
-                let Reply { verdict, snapshot, .. } = reply;
-                return response(verdict, Some(snapshot));
-            }
-        }
-        thread::sleep(Duration::from_micros(100));
-    }
-    response(Verdict::Busy, newest)
-}
-
-fn order(command: &Command) -> Option<Order> {
-    Some(match CommandKind::from_wire(command.kind)? {
-        CommandKind::Status => Order::Status,
-        CommandKind::Pause => Order::Pause,
-        CommandKind::Resume => Order::Resume,
-        CommandKind::Stop => Order::Stop,
-        CommandKind::StopAndDisable => Order::StopAndDisable,
-        CommandKind::Speed => Order::Speed(command.value),
-        CommandKind::Reset => Order::Reset,
-    })
-}
-
-fn response(verdict: Verdict, snapshot: Option<Snapshot>) -> Response {
-    Response {
-        stamp_ns: now_ns(),
-        plan: snapshot.map_or(PlanId::NONE, |s| s.plan),
-        speed_scale: snapshot.map_or(0.0, |s| s.scale),
-        verdict: verdict.wire(),
-        mode: snapshot.map_or(Mode::Init, |s| s.mode).wire(),
-        fault: snapshot.map_or(Fault::None, |s| s.fault).wire(),
-        knot: snapshot.map_or(0, |s| s.knot),
-    }
 }
 
 fn on_wire(event: &Event, sequence: u64) -> PlanEvent {

@@ -8,15 +8,19 @@ use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::ports::{Ipc, IpcError, PlanReceiver, now_ns};
 use nullsweep_ipc_types::{EventKind, Knot, MAX_KNOTS, Reason};
+use rtrb::PushError;
 
 use crate::admit::{Held, Rejection, Rules, admit};
 use crate::cycle::Event;
 use crate::ids::Ids;
 use crate::record::Recorder;
-use crate::slots::Slots;
+use crate::slots::{HELD_ROOM, WorkerEnd};
 
 /// Pause between two looks.
 const ROUND: Duration = Duration::from_millis(1);
+/// How long a plan is left where it is while it is not known where the held joints stand; they are
+/// told 100 times a second.
+const HELD_WITHIN: Duration = Duration::from_millis(100);
 /// Pause between two sweeps for dead processes.
 const SWEEP: Duration = Duration::from_secs(1);
 
@@ -25,10 +29,12 @@ const SWEEP: Duration = Duration::from_secs(1);
 pub(crate) struct Worker<'a> {
     ipc: &'a Ipc,
     receiver: PlanReceiver,
-    slots: Arc<Slots>,
+    slots: WorkerEnd,
     rules: Rules,
     copy: Vec<Knot>,
     held: Option<Held>,
+    /// Since when it is not known where the held joints stand.
+    unknown: Instant,
     ids: Ids,
     recorder: Option<Recorder>,
 }
@@ -36,27 +42,27 @@ pub(crate) struct Worker<'a> {
 impl<'a> Worker<'a> {
     pub(crate) fn open(
         ipc: &'a Ipc,
-        slots: Arc<Slots>,
+        slots: WorkerEnd,
         rules: Rules,
         recorder: Option<Recorder>,
     ) -> Result<Self, IpcError> {
         let receiver = ipc.plan_receiver()?;
         let copy = Vec::with_capacity(MAX_KNOTS);
-        let (held, ids) = (None, Ids::default());
-        Ok(Self { ipc, receiver, slots, rules, copy, held, ids, recorder })
+        let (held, unknown, ids) = (None, Instant::now(), Ids::default());
+        Ok(Self { ipc, receiver, slots, rules, copy, held, unknown, ids, recorder })
     }
 
     /// Runs until `done`.
     pub(crate) fn run(mut self, done: &AtomicBool) {
         let mut swept = Instant::now();
         while !done.load(Ordering::Acquire) {
-            while let Some(plan) = self.slots.retired.pop() {
+            while let Ok(plan) = self.slots.retired.pop() {
                 drop(plan);
             }
-            if let Some(held) = self.slots.held.pop() {
-                self.held = Some(held);
+            self.take_held();
+            if self.held.is_some() || self.unknown.elapsed() >= HELD_WITHIN {
+                self.take_plan();
             }
-            self.take_plan();
             self.write_record(Recorder::round);
             if swept.elapsed() >= SWEEP {
                 let count = self.ipc.sweep_dead_nodes();
@@ -78,6 +84,18 @@ impl<'a> Worker<'a> {
         {
             tracing::error!("the flight recorder stops: {e}");
             self.recorder = None;
+        }
+    }
+
+    /// Takes the newest held joints. Where their queue was full this thread was put aside for long,
+    /// and what it finds there is old: then newer ones are waited for.
+    fn take_held(&mut self) {
+        let missed = self.slots.held.slots() >= HELD_ROOM;
+        while let Ok(held) = self.slots.held.pop() {
+            self.held = Some(held);
+        }
+        if missed {
+            (self.held, self.unknown) = (None, Instant::now());
         }
     }
 
@@ -106,7 +124,7 @@ impl<'a> Worker<'a> {
             if let Some(recorder) = &mut self.recorder {
                 recorder.plan(&plan);
             }
-            self.slots.offers.push(plan).map_err(|plan| {
+            self.slots.offers.push(plan).map_err(|PushError::Full(plan)| {
                 if let Some(recorder) = &mut self.recorder {
                     recorder.withdraw(&plan);
                 }

@@ -85,6 +85,8 @@ pub const PLAN_EVENT: Qos = Qos {
 pub const COMMAND: &str = "command";
 /// Most clients of the command service.
 pub const COMMAND_CLIENTS: usize = 4;
+/// Questions that one of them may have open.
+pub const COMMAND_REQUESTS: usize = 4;
 /// Nodes (processes) that may open one service at once.
 pub const MAX_NODES: usize = 20;
 /// The robot's name in the service names where none is given.

@@ -180,12 +180,14 @@ fn commands_there_and_back() {
             let ipc = Ipc::open("pr2", Some(root.path())).unwrap();
             let server = ipc.command_server().unwrap();
             while !done.load(Ordering::Acquire) {
-                let answer = |c: &nullsweep_ipc_types::Command| Response {
-                    speed_scale: c.value,
-                    verdict: Verdict::Accepted.wire(),
-                    ..Response::zeroed()
-                };
-                server.answer(answer).unwrap();
+                while let Some(request) = server.receive().unwrap() {
+                    let response = Response {
+                        speed_scale: request.command().value,
+                        verdict: Verdict::Accepted.wire(),
+                        ..Response::zeroed()
+                    };
+                    request.answer(response).unwrap();
+                }
                 thread::sleep(Duration::from_micros(200));
             }
         });

@@ -118,6 +118,11 @@ pub struct Ask {
     pub order: Order,
 }
 
+impl Ask {
+    /// The ticket of what a signal asks for: nobody waits for the answer.
+    pub const SIGNAL: u64 = u64::MAX;
+}
+
 /// What is asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {

@@ -137,6 +137,12 @@ impl State {
         self.sequence
     }
 
+    /// Whether a shutdown was ordered.
+    #[must_use]
+    pub fn is_shutting_down(&self) -> bool {
+        self.shutdown
+    }
+
     /// Whether a shutdown was ordered and the arm stands still with its motors asked off.
     #[must_use]
     pub fn is_down(&self) -> bool {

@@ -1,7 +1,7 @@
 //! The flight recorder: every cycle's input and setpoint, so that what happened can be replayed
 //! bit for bit.
 //!
-//! The loop hands each cycle on through a lock-free queue; the worker writes. A recording begins
+//! The loop hands each cycle on through a wait-free queue; the worker writes. A recording begins
 //! with the loop's memory at a moment without plans. Two files take turns, so the newest part is
 //! always there and the disk does not fill: when one has its size, the recorder changes over at
 //! the next moment without plans.
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use crossbeam::queue::ArrayQueue;
+use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::admit::ValidPlan;
 use crate::cycle::{Checkpoint, Input, State, Target};
@@ -32,21 +32,18 @@ const CHUNK: usize = 64 << 10;
 /// The loop's end of the recorder.
 #[derive(Debug)]
 pub(crate) struct Tape {
-    cycles: ArrayQueue<CycleRecord>,
-    checkpoints: ArrayQueue<Checkpoint>,
-    wanted: AtomicBool,
-    lost: AtomicU64,
+    cycles: Producer<CycleRecord>,
+    checkpoints: Producer<Checkpoint>,
+    shared: Arc<Shared>,
 }
 
-impl Default for Tape {
-    fn default() -> Self {
-        Self {
-            cycles: ArrayQueue::new(WAITING),
-            checkpoints: ArrayQueue::new(1),
-            wanted: AtomicBool::new(true),
-            lost: AtomicU64::new(0),
-        }
-    }
+/// What lies between the two ends beside the queues.
+#[derive(Debug)]
+struct Shared {
+    /// The worker wants a checkpoint.
+    wanted: AtomicBool,
+    /// Cycles that found no room.
+    lost: AtomicU64,
 }
 
 impl Tape {
@@ -56,17 +53,17 @@ impl Tape {
     }
 
     /// After it: adds what it gave and hands it on, with the loop's memory where one is wanted.
-    pub(crate) fn push(&self, mut record: CycleRecord, target: Option<&Target>, state: &State) {
+    pub(crate) fn push(&mut self, mut record: CycleRecord, target: Option<&Target>, state: &State) {
         record.target = target.into();
-        if self.wanted.load(Ordering::Relaxed)
+        if self.shared.wanted.load(Ordering::Relaxed)
             && let Some(checkpoint) = state.checkpoint()
             && self.checkpoints.push(checkpoint).is_ok()
         {
             record.checkpoint = 1;
-            self.wanted.store(false, Ordering::Relaxed);
+            self.shared.wanted.store(false, Ordering::Relaxed);
         }
         if self.cycles.push(record).is_err() {
-            self.lost.fetch_add(1, Ordering::Relaxed);
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
@@ -74,7 +71,9 @@ impl Tape {
 /// The worker's end.
 #[derive(Debug)]
 pub(crate) struct Recorder {
-    tape: Arc<Tape>,
+    cycles: Consumer<CycleRecord>,
+    checkpoints: Consumer<Checkpoint>,
+    shared: Arc<Shared>,
     folder: PathBuf,
     limit: u64,
     guard: Guard,
@@ -88,16 +87,17 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    /// Records into `folder`, two files of about `limit` bytes each.
-    pub(crate) fn new(
-        tape: Arc<Tape>,
-        folder: &Path,
-        limit: u64,
-        guard: Guard,
-    ) -> io::Result<Self> {
+    /// Records into `folder`, two files of about `limit` bytes each, what is put on the tape.
+    pub(crate) fn new(folder: &Path, limit: u64, guard: Guard) -> io::Result<(Self, Tape)> {
         fs::create_dir_all(folder)?;
-        Ok(Self {
-            tape,
+        let (cycle, cycles) = RingBuffer::new(WAITING);
+        let (checkpoint, checkpoints) = RingBuffer::new(1);
+        let shared = Arc::new(Shared { wanted: AtomicBool::new(true), lost: AtomicU64::new(0) });
+        let tape = Tape { cycles: cycle, checkpoints: checkpoint, shared: shared.clone() };
+        let recorder = Self {
+            cycles,
+            checkpoints,
+            shared,
             folder: folder.to_path_buf(),
             limit,
             guard,
@@ -107,7 +107,8 @@ impl Recorder {
             buffer: Vec::with_capacity(2 * CHUNK),
             offered: Vec::new(),
             lost: 0,
-        })
+        };
+        Ok((recorder, tape))
     }
 
     /// Notes a plan that is about to be offered to the loop.
@@ -125,7 +126,7 @@ impl Recorder {
 
     /// Writes what the loop handed on.
     pub(crate) fn round(&mut self) -> io::Result<()> {
-        let lost = self.tape.lost.load(Ordering::Relaxed);
+        let lost = self.shared.lost.load(Ordering::Relaxed);
         if lost > self.lost {
             // A recording with a hole cannot be replayed past it: begin anew.
             tracing::warn!("flight recorder: {} cycles were not written", lost - self.lost);
@@ -134,13 +135,13 @@ impl Recorder {
             self.want_checkpoint();
         }
         for _ in 0..WAITING {
-            let Some(record) = self.tape.cycles.pop() else { break };
+            let Ok(record) = self.cycles.pop() else { break };
             if self.file.is_some() {
                 put(&mut self.buffer, Tag::Cycle, &[bytemuck::bytes_of(&record)]);
             }
             self.offered.retain(|p| p.id() != record.offer);
             if record.checkpoint != 0
-                && let Some(checkpoint) = self.tape.checkpoints.pop()
+                && let Ok(checkpoint) = self.checkpoints.pop()
             {
                 self.change_over(&checkpoint)?;
             }
@@ -167,7 +168,7 @@ impl Recorder {
     }
 
     fn want_checkpoint(&self) {
-        self.tape.wanted.store(true, Ordering::Relaxed);
+        self.shared.wanted.store(true, Ordering::Relaxed);
     }
 
     fn change_over(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {

@@ -1,12 +1,10 @@
 //! A recording made on a virtual clock, replayed whole and tampered with.
 
-use std::sync::Arc;
-
 use bytemuck::Zeroable;
 use nullsweep_ipc_types::{EventKind, JoinRule, JointStates, status};
 
 use super::format::{CycleRecord, MAGIC, Tag, put, take};
-use super::{Recorder, ReplayError, Tape, replay};
+use super::{Recorder, ReplayError, replay};
 use crate::guard::tests::pr2;
 use crate::rt::Wake;
 use crate::testing::{HOME, MS, moved, plan};
@@ -16,8 +14,7 @@ use crate::{Driver, Loopback, Slots};
 fn a_setpoint_that_differs_in_one_bit_is_found() {
     let folder = tempfile::TempDir::new().unwrap();
     let guard = pr2();
-    let tape = Arc::new(Tape::default());
-    let mut recorder = Recorder::new(tape.clone(), folder.path(), 1 << 30, guard).unwrap();
+    let (mut recorder, tape) = Recorder::new(folder.path(), 1 << 30, guard).unwrap();
     let mut states = JointStates {
         joint_count: 7,
         status: status::CALIBRATED,
@@ -25,15 +22,15 @@ fn a_setpoint_that_differs_in_one_bit_is_found() {
         ..JointStates::zeroed()
     };
     states.positions[..8].copy_from_slice(&HOME[..]);
-    let slots = Arc::new(Slots::default());
-    let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
+    let Slots { looping, mut worker, service: _service } = Slots::default();
+    let mut driver = Driver::new(Loopback::new(states, 2), guard, looping);
     driver.record(tape);
     for cycle in 1..=400u64 {
         if cycle == 50 {
             let points = [(0, HOME), (200 * MS, moved(HOME, 0, 0.2))];
             let plan = plan(&guard, 1, JoinRule::StopThenStart, &points);
             recorder.plan(&plan);
-            slots.offers.push(plan).unwrap();
+            worker.offers.push(plan).unwrap();
         }
         driver.cycle(Wake { deadline_ns: cycle * MS, now_ns: cycle * MS + 3, missed: 0 });
         recorder.round().unwrap();

@@ -2,14 +2,14 @@
 
 use std::fs::File;
 use std::io::Write as _;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::{CommandKind, EventKind, Mode, Reason, Verdict};
 use tempfile::TempDir;
 
-use crate::rig::{Executor, PATIENT, System, command, next};
+use crate::rig::{Executor, PATIENT, System, command, next, wait};
 
 /// Standard error that cannot be written to.
 #[derive(Clone, Copy, Debug)]
@@ -41,17 +41,6 @@ fn broken(how: Broken) -> (Stdio, Option<std::io::PipeReader>) {
     thread::sleep(Duration::from_millis(200));
     assert!(!fills.is_finished(), "it is full");
     (writer.into(), Some(reader))
-}
-
-fn wait(child: &mut Child) -> Option<i32> {
-    let end = Instant::now() + Duration::from_secs(20);
-    while Instant::now() < end {
-        if let Some(status) = child.try_wait().expect("known") {
-            return status.code();
-        }
-        thread::sleep(Duration::from_millis(5));
-    }
-    panic!("it does not end");
 }
 
 /// Plans are admitted and rejected, commands answered, and SIGTERM ends it, whatever becomes of

@@ -8,3 +8,4 @@ mod plans;
 mod recording;
 mod replaced;
 mod rig;
+mod stop;

@@ -235,3 +235,15 @@ pub(crate) fn next(events: &Receiver<PlanEvent>, id: PlanId) -> (EventKind, Reas
     }
     panic!("no event of plan {id}");
 }
+
+/// Its exit code; none where a signal ended it.
+pub(crate) fn wait(child: &mut Child) -> Option<i32> {
+    let end = Instant::now() + Duration::from_secs(20);
+    while Instant::now() < end {
+        if let Some(status) = child.try_wait().expect("known") {
+            return status.code();
+        }
+        thread::sleep(Duration::from_millis(5));
+    }
+    panic!("it does not end");
+}

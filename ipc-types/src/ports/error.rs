@@ -3,6 +3,7 @@
 use std::format;
 use std::path::{Path, PathBuf};
 use std::string::String;
+use std::time::Duration;
 
 use iceoryx2::node::NodeCreationFailure;
 use iceoryx2::port::publisher::PublisherCreateError;
@@ -20,6 +21,7 @@ use iceoryx2::service::port_factory::client::ClientCreateError;
 use iceoryx2::service::port_factory::server::ServerCreateError;
 
 use super::owner::{Foreign, User};
+use super::spoilt::Spoilt;
 
 /// Why a port could not be opened, or a plan or command not delivered.
 #[derive(Debug, thiserror::Error)]
@@ -93,15 +95,32 @@ pub enum IpcError {
         /// \[bytes\]
         free: u64,
     },
+    /// A file of iceoryx2's is half made or damaged.
+    #[error(
+        "{what}: {}, which belongs to {owner}, is of no use ({detail}): a process died while it made \
+         it, or another user wrote to it; remove it and try again: no process that runs needs it",
+        .file.display()
+    )]
+    Spoilt {
+        /// Which service.
+        what: String,
+        /// The file.
+        file: PathBuf,
+        /// Whose it is.
+        owner: User,
+        /// What is wrong with it.
+        detail: String,
+    },
     /// Others kept creating and removing it, or a crash left it half made.
     #[error(
-        "{what}: still in flux after {attempts} attempts ({detail}); stop the others and retry"
+        "{what}: still in flux after {:.1} s ({detail}); stop the others and retry",
+        .tried.as_secs_f64()
     )]
     InFlux {
         /// Which service.
         what: String,
-        /// How often it was tried.
-        attempts: u32,
+        /// For how long it was tried.
+        tried: Duration,
         /// What iceoryx2 says.
         detail: String,
     },
@@ -154,6 +173,13 @@ pub enum IpcError {
         /// What iceoryx2 says.
         detail: String,
     },
+}
+
+impl IpcError {
+    pub(super) fn spoilt(what: &str, spoilt: Spoilt, detail: &str) -> Self {
+        let Spoilt { file, owner } = spoilt;
+        Self::Spoilt { what: what.into(), file, owner, detail: detail.into() }
+    }
 }
 
 /// Why sending or receiving failed. Small, `Copy` and made without allocating: it may arise in
@@ -211,6 +237,8 @@ pub(super) enum Cause {
     Taken(String),
     Incompatible(String),
     Permission(String),
+    /// A node gets no number.
+    Counter(String),
     Other(String),
 }
 
@@ -219,7 +247,7 @@ impl Cause {
         self,
         what: &str,
         root: Option<&Path>,
-        attempts: u32,
+        tried: Duration,
         foreign: Option<Foreign>,
     ) -> IpcError {
         let what = String::from(what);
@@ -231,10 +259,10 @@ impl Cause {
             return IpcError::OtherUser { what, file: f.file, owner: f.owner, own: f.own, detail };
         }
         match self {
-            Self::InFlux(detail) => IpcError::InFlux { what, attempts, detail },
+            Self::InFlux(detail) => IpcError::InFlux { what, tried, detail },
             Self::Taken(detail) => IpcError::Taken { what, detail },
             Self::Incompatible(detail) => IpcError::Incompatible { what, detail },
-            Self::Permission(detail) => {
+            Self::Permission(detail) | Self::Counter(detail) => {
                 IpcError::Permission { what, root: root.map(Path::to_path_buf), detail }
             }
             Self::Other(detail) => IpcError::Other { what, detail },
@@ -318,9 +346,8 @@ impl From<NodeCreationFailure> for Cause {
     fn from(e: NodeCreationFailure) -> Self {
         let text = format!("{e:?}");
         match e {
-            // A node whose id files cannot be made is, on one machine, another user's.
-            NodeCreationFailure::InsufficientPermissions
-            | NodeCreationFailure::UnableToGenerateUniqueNodeId => Self::Permission(text),
+            NodeCreationFailure::InsufficientPermissions => Self::Permission(text),
+            NodeCreationFailure::UnableToGenerateUniqueNodeId => Self::Counter(text),
             NodeCreationFailure::SystemCorrupted => Self::InFlux(text),
             NodeCreationFailure::InternalError => Self::Other(text),
         }
@@ -390,7 +417,7 @@ mod tests {
             PublisherCreateError::UnableToCreatePortTag.into(),
             Cause::from(Ps::PublishSubscribeOpenError(PsOpen::InternalFailure)),
         ] {
-            let text = format!("{}", cause.error("state", None, 1, foreign()));
+            let text = format!("{}", cause.error("state", None, Duration::ZERO, foreign()));
             let told = "state: another user's robot or folder: elsewhere/nodes belongs to uid \
                         4000001, and this process runs as uid 4000002 (";
             assert!(text.starts_with(told), "{text}");
@@ -398,8 +425,11 @@ mod tests {
         }
         // What is wrong for another reason stays so.
         let full = Cause::from(ServerCreateError::ExceedsMaxSupportedServers);
-        assert!(matches!(full.error("command", None, 1, foreign()), IpcError::Taken { .. }));
+        assert!(matches!(
+            full.error("command", None, Duration::ZERO, foreign()),
+            IpcError::Taken { .. }
+        ));
         let other = Cause::from(NodeCreationFailure::InternalError);
-        assert!(matches!(other.error("node", None, 1, None), IpcError::Other { .. }));
+        assert!(matches!(other.error("node", None, Duration::ZERO, None), IpcError::Other { .. }));
     }
 }

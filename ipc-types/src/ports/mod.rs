@@ -15,14 +15,15 @@ mod error;
 mod node;
 mod owner;
 mod plan;
+mod spoilt;
 mod stream;
 
 use crate::service;
 use crate::{JointStates, PlanEvent, Setpoint, Telemetry};
 pub use clock::now_ns;
-pub use command::{CommandClient, CommandServer};
+pub use command::{Asked, CommandClient, CommandServer, Request};
 pub use error::{IpcError, PortError};
-pub use node::{Ipc, free_shared_memory};
+pub use node::{Ipc, free_shared_memory, within};
 pub use owner::User;
 pub use plan::{PlanPublisher, PlanReceiver, ReceivedPlan};
 pub use stream::{Newest, Payload, Receiver, Sender};

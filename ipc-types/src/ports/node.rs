@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::string::{String, ToString};
-use std::time::Duration;
-use std::{format, thread};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+use std::{format, io, thread};
 
 use iceoryx2::prelude::{
     Config, FileName, Node, NodeBuilder, NodeName, Path as IoxPath, SemanticString, ServiceName,
@@ -14,11 +15,14 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::error::{Cause, IpcError};
 use super::owner::{Foreign, foreign};
+use super::spoilt;
 
-/// How often an operation is tried again when other processes create or remove the same service.
-const ATTEMPTS: u32 = 40;
+/// How long an operation is tried again when other processes create or remove the same service.
+const RETRY_WITHIN: Duration = Duration::from_secs(3);
 /// Pause between two attempts.
 const PAUSE: Duration = Duration::from_millis(25);
+/// How long making a node may take, whatever it waits for.
+const NODE_WITHIN: Duration = Duration::from_secs(6);
 /// Shared memory that must be free before any port is made: all ports but the plan's together.
 const SHM_RESERVE: u64 = 1 << 20;
 
@@ -36,6 +40,7 @@ pub struct Ipc {
     pub(super) node: Node<ipc::Service>,
     robot: String,
     root: Option<PathBuf>,
+    prefix: String,
 }
 
 impl core::fmt::Debug for Ipc {
@@ -46,7 +51,8 @@ impl core::fmt::Debug for Ipc {
 
 impl Ipc {
     /// Opens the door to `robot`'s services. `root` isolates this system from others on the
-    /// machine (it is created where missing); `None` is iceoryx2's own default.
+    /// machine (it is created where missing); `None` is iceoryx2's own default. Takes a few seconds
+    /// at most, whatever is in the way.
     pub fn open(robot: &str, root: Option<&Path>) -> Result<Self, IpcError> {
         if robot.is_empty()
             || !robot.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b))
@@ -57,15 +63,23 @@ impl Ipc {
         let config = config(root)?;
         let name = NodeName::new(&format!("nullsweep-{robot}"))
             .map_err(|_| IpcError::RobotName { name: robot.into() })?;
-        let node = retry(robot, root, || {
-            NodeBuilder::new()
-                .name(&name)
-                // The binaries have their own handlers: a stop on the path takes time.
-                .signal_handling_mode(SignalHandlingMode::Disabled)
-                .config(&config)
-                .create::<ipc::Service>()
-        })?;
-        Ok(Self { node, robot: robot.into(), root: root.map(Path::to_path_buf) })
+        let prefix = config.global.prefix.to_string();
+        let (what, place, own) = (robot.to_string(), root.map(Path::to_path_buf), prefix.clone());
+        let made = within(NODE_WITHIN, move || {
+            retry(&what, place.as_deref(), &own, || {
+                NodeBuilder::new()
+                    .name(&name)
+                    // The binaries have their own handlers: a stop on the path takes time.
+                    .signal_handling_mode(SignalHandlingMode::Disabled)
+                    .config(&config)
+                    .create::<ipc::Service>()
+            })
+        });
+        let node = made.map_err(|e| stuck(robot, &prefix, &e))??;
+        if root.is_some() {
+            spoilt::keep_counter(&prefix);
+        }
+        Ok(Self { node, robot: robot.into(), root: root.map(Path::to_path_buf), prefix })
     }
 
     /// The robot's name in the services' names.
@@ -78,6 +92,12 @@ impl Ipc {
     #[must_use]
     pub fn root(&self) -> Option<&Path> {
         self.root.as_deref()
+    }
+
+    /// What the names of this system's files in `/dev/shm` begin with.
+    #[must_use]
+    pub fn prefix(&self) -> &str {
+        &self.prefix
     }
 
     /// Removes what processes that died left behind; how many were swept. A sweep takes
@@ -96,26 +116,62 @@ impl Ipc {
         what: &str,
         attempt: impl FnMut() -> Result<T, E>,
     ) -> Result<T, IpcError> {
-        retry(what, self.root(), attempt)
+        retry(what, self.root(), &self.prefix, attempt)
     }
 }
 
-/// Tries again, a bounded number of times, while other processes create or remove the same thing.
+/// Tries again, for a bounded time, while other processes create or remove the same thing.
 fn retry<T, E: Into<Cause>>(
     what: &str,
     root: Option<&Path>,
+    prefix: &str,
     mut attempt: impl FnMut() -> Result<T, E>,
 ) -> Result<T, IpcError> {
-    let mut left = ATTEMPTS;
+    let start = Instant::now();
     loop {
-        match attempt().map_err(Into::into) {
-            Ok(made) => return Ok(made),
-            Err(Cause::InFlux(_)) if left > 1 => {
-                left -= 1;
-                thread::sleep(PAUSE);
-            }
-            Err(cause) => return Err(cause.error(what, root, ATTEMPTS, in_the_way(root))),
+        let late = start.elapsed() >= RETRY_WITHIN;
+        // One that is just being made has a length a moment later.
+        match spoilt::empty(prefix) {
+            Some(empty) if late => return Err(IpcError::spoilt(what, empty, "it is empty")),
+            Some(_) => {}
+            None => match attempt().map_err(Into::into) {
+                Ok(made) => return Ok(made),
+                Err(Cause::InFlux(_)) if !late => {}
+                Err(Cause::Counter(detail)) => return Err(no_number(what, root, prefix, detail)),
+                Err(cause) => {
+                    return Err(cause.error(what, root, start.elapsed(), in_the_way(root)));
+                }
+            },
         }
+        thread::sleep(PAUSE);
+    }
+}
+
+/// A node got no number: its counter is another user's, or damaged.
+fn no_number(what: &str, root: Option<&Path>, prefix: &str, detail: String) -> IpcError {
+    match (in_the_way(root), spoilt::counter(prefix)) {
+        (None, Some(counter)) => IpcError::spoilt(what, counter, &detail),
+        (foreign, _) => Cause::Permission(detail).error(what, root, Duration::ZERO, foreign),
+    }
+}
+
+/// Does something in a thread of its own, which is left behind where it takes longer than `limit`.
+///
+/// # Errors
+/// [`io::ErrorKind::TimedOut`] then, or what keeps the thread from being started.
+pub fn within<T: Send + 'static>(
+    limit: Duration,
+    make: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<T> {
+    let (sender, made) = mpsc::sync_channel(1);
+    thread::Builder::new().name("ipc".into()).spawn(move || sender.send(make()))?;
+    made.recv_timeout(limit).map_err(|_| io::ErrorKind::TimedOut.into())
+}
+
+fn stuck(what: &str, prefix: &str, e: &io::Error) -> IpcError {
+    match spoilt::empty(prefix) {
+        Some(empty) => IpcError::spoilt(what, empty, "it is empty"),
+        None => IpcError::Other { what: what.into(), detail: e.to_string() },
     }
 }
 
@@ -165,6 +221,8 @@ fn configured(root: &Path) -> Result<Config, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
     use super::*;
 
     #[test]
@@ -172,5 +230,63 @@ mod tests {
         let e = need_shared_memory(u64::MAX).unwrap_err();
         assert!(matches!(e, IpcError::SharedMemoryFull { .. }), "{e}");
         assert!(need_shared_memory(0).is_ok());
+    }
+
+    /// Opens a second door while the node counter holds `content`: how long it took, the counter, and
+    /// what was said.
+    fn opened(content: &[u8]) -> (Duration, PathBuf, IpcError) {
+        let root = tempfile::TempDir::new().unwrap();
+        let first = Ipc::open("pr2", Some(root.path())).unwrap();
+        let counter = spoilt::counter(&first.prefix).unwrap().file;
+        let mode = fs::metadata(&counter).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600, "nobody else writes to it");
+        fs::write(&counter, content).unwrap();
+        let start = Instant::now();
+        let e = Ipc::open("pr2", Some(root.path())).unwrap_err();
+        let took = start.elapsed();
+        // Who has a node needs no number any more.
+        if !content.is_empty() {
+            first.telemetry_sender().unwrap();
+        }
+        // The remedy that is told is one.
+        fs::remove_file(&counter).unwrap();
+        Ipc::open("pr2", Some(root.path())).unwrap();
+        fs::remove_file(&counter).unwrap();
+        (took, counter, e)
+    }
+
+    #[test]
+    fn a_damaged_node_counter_is_told_within_seconds() {
+        for content in [&b""[..], &[0; 3], &[0; 16], &[0xab; 16]] {
+            let (took, counter, e) = opened(content);
+            assert!(took < 2 * NODE_WITHIN, "{content:?}: {took:?}");
+            let told = format!("pr2: {}, which belongs to ", counter.display());
+            let text = e.to_string();
+            assert!(text.starts_with(&told) && text.contains("remove it and try again"), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_empty_segment_is_told_at_every_port() {
+        let root = tempfile::TempDir::new().unwrap();
+        let ipc = Ipc::open("pr2", Some(root.path())).unwrap();
+        let left = PathBuf::from(format!("/dev/shm/{}left_behind", ipc.prefix));
+        fs::write(&left, "").unwrap();
+        let text = ipc.telemetry_receiver().unwrap_err().to_string();
+        fs::remove_file(&left).unwrap();
+        assert!(
+            text.starts_with("telemetry: /dev/shm/nsw_") && text.contains("it is empty"),
+            "{text}"
+        );
+        ipc.telemetry_receiver().unwrap();
+        let _ = fs::remove_file(spoilt::counter(&ipc.prefix).unwrap().file);
+    }
+
+    #[test]
+    fn what_takes_for_ever_is_left_behind() {
+        let limit = Duration::from_millis(20);
+        let e = within(limit, || thread::sleep(Duration::from_secs(60))).unwrap_err();
+        assert_eq!(e.kind(), io::ErrorKind::TimedOut);
+        assert_eq!(within(limit * 100, || 5).unwrap(), 5);
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::EventKind;
+use nullsweep_ipc_types::ports::Ipc;
 use nullsweep_planner::plan::{
     Continues, CostKind, FORMAT, Held, Method, Plan, PlanKnot, Profile, SurfaceSample,
 };
@@ -136,6 +137,25 @@ fn a_plan_file_without_an_executor_says_so() {
     let (code, said) = ended(publish(&stage, &path, &[]));
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("no executor is running"), "{said}");
+}
+
+/// What a process that died while it started leaves: iceoryx2 itself waits for it without end.
+#[test]
+fn a_file_that_a_crash_left_empty_is_told_and_not_waited_for() {
+    let stage = stage();
+    let arm = right_arm();
+    let sketch = Sketch::swings(&arm, &arm.home(), 1, 0.1, 0.1);
+    let path = write(&stage, "plan.json", &plan(&arm, &sketch));
+    let prefix = Ipc::open(stage.robot(), Some(&stage.root())).expect("a door").prefix().to_owned();
+    let empty = PathBuf::from(format!("/dev/shm/{prefix}left_behind"));
+    std::fs::write(&empty, "").expect("a file");
+    let start = Instant::now();
+    let (code, said) = ended(publish(&stage, &path, &[]));
+    std::fs::remove_file(&empty).expect("it is there");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains(&format!("{}, which belongs to", empty.display())), "{said}");
+    assert!(said.contains("remove it and try again"), "{said}");
+    assert!(start.elapsed() < Duration::from_secs(20), "{:?}", start.elapsed());
 }
 
 #[test]

@@ -10,14 +10,16 @@ use nullsweep_ipc_types::{
     HISTOGRAM_BUCKETS, JointStates, MAX_HELD_JOINTS, MAX_JOINTS, Mode, PlanId, Setpoint,
     bucket_upper_ns,
 };
+use rtrb::PushError;
 
 use crate::admit::{Held, ValidPlan};
+use crate::alarm::Alarm;
 use crate::cycle::{Ask, HELD_MOVED, Input, Measured, State, Target, step};
 use crate::guard::Guard;
 use crate::hardware::Hardware;
 use crate::record::Tape;
 use crate::rt::Wake;
-use crate::slots::{Report, Slots};
+use crate::slots::{LoopEnd, Report};
 use crate::{JointVector, MAX_DOF};
 
 /// Setpoints whose round trip is told.
@@ -31,8 +33,9 @@ pub struct Driver<H> {
     hardware: H,
     guard: Guard,
     state: State,
-    slots: Arc<Slots>,
-    tape: Option<Arc<Tape>>,
+    slots: LoopEnd,
+    alarm: Alarm,
+    tape: Option<Tape>,
     /// Where the held joints stood when the motion began.
     reference: Option<Held>,
     lateness: [u32; HISTOGRAM_BUCKETS],
@@ -64,12 +67,13 @@ struct Early {
 
 impl<H: Hardware> Driver<H> {
     /// A loop that has not run yet.
-    pub fn new(hardware: H, guard: Guard, slots: Arc<Slots>) -> Self {
+    pub fn new(hardware: H, guard: Guard, slots: LoopEnd) -> Self {
         Self {
             hardware,
             guard,
             state: State::default(),
             slots,
+            alarm: Alarm::default(),
             tape: None,
             reference: None,
             lateness: [0; HISTOGRAM_BUCKETS],
@@ -87,8 +91,13 @@ impl<H: Hardware> Driver<H> {
     }
 
     /// Hands every cycle on to the flight recorder.
-    pub(crate) fn record(&mut self, tape: Arc<Tape>) {
+    pub(crate) fn record(&mut self, tape: Tape) {
         self.tape = Some(tape);
+    }
+
+    /// Heeds this alarm.
+    pub fn heed(&mut self, alarm: Alarm) {
+        self.alarm = alarm;
     }
 
     /// The endpoint.
@@ -145,10 +154,10 @@ impl<H: Hardware> Driver<H> {
             self.early.states = Some(states);
         }
         if self.early.ask.is_none() {
-            self.early.ask = self.slots.asks.pop();
+            self.early.ask = self.slots.asks.pop().ok();
         }
         if self.early.offer.is_none() && self.slots.has_room_for_events() {
-            self.early.offer = self.slots.offers.pop();
+            self.early.offer = self.slots.offers.pop().ok();
         }
     }
 
@@ -164,12 +173,14 @@ impl<H: Hardware> Driver<H> {
         self.cycles += 1;
         self.gather();
         let Early { states, ask, offer } = std::mem::take(&mut self.early);
+        let ask = self.decide(ask);
         let tell_held = self.mode() == Mode::Init || self.cycles.is_multiple_of(REPORT_EVERY);
         let measured = states.as_ref().map(|states| {
             let held = held(states);
             // Each cycle at first, so that the worker has them before anybody can have seen Hold.
             if tell_held {
-                self.slots.held.force_push(held);
+                // The worker sees that newer ones found no room.
+                let _ = self.slots.held.push(held);
             }
             let mut measured = measured(states);
             if self.has_moved(held) {
@@ -187,7 +198,7 @@ impl<H: Hardware> Driver<H> {
                 self.failures += 1;
             }
         }
-        if let (Some(tape), Some(record)) = (&self.tape, record) {
+        if let (Some(tape), Some(record)) = (&mut self.tape, record) {
             tape.push(record, out.setpoint.as_ref(), &self.state);
         }
         for event in &out.events {
@@ -195,13 +206,14 @@ impl<H: Hardware> Driver<H> {
             let _ = self.slots.events.push(*event);
         }
         for plan in out.retired {
-            if let Err(plan) = self.slots.retired.push(plan) {
+            if let Err(PushError::Full(plan)) = self.slots.retired.push(plan) {
                 // Freeing here would enter the heap; the worker is stuck anyway.
                 std::mem::forget(plan);
             }
         }
         if let Some(reply) = out.reply {
-            self.slots.replies.force_push(reply);
+            // There is room: one order is asked at a time.
+            let _ = self.slots.replies.push(reply);
         }
         self.unreported += 1;
         self.stamp_ns = wake.now_ns;
@@ -215,13 +227,25 @@ impl<H: Hardware> Driver<H> {
     /// Tells the state after the last cycle.
     fn report(&mut self) {
         self.unreported = 0;
-        self.slots.reports.force_push(Report {
+        let report = Report {
             stamp_ns: self.stamp_ns,
             snapshot: self.state.snapshot(),
             lateness: self.lateness,
             compute: self.compute,
             round_trip: self.round_trip,
-        });
+        };
+        // Without room nobody reads them.
+        let _ = self.slots.reports.push(report);
+    }
+
+    /// What is carried out in this cycle: what a signal asks for before all else, then the order that
+    /// waits, unless it was withdrawn.
+    fn decide(&mut self, ask: Option<Ask>) -> Option<Ask> {
+        if let Some(order) = self.alarm.take(self.state.is_shutting_down()) {
+            self.early.ask = ask;
+            return Some(Ask { ticket: Ask::SIGNAL, order });
+        }
+        ask.filter(|ask| self.slots.claim.decide(ask.ticket))
     }
 
     /// Counts a wake-up and how long its cycle took, with the lateness of each deadline that was
@@ -319,99 +343,4 @@ fn count(histogram: &mut [u32; HISTOGRAM_BUCKETS], value_ns: u64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use bytemuck::Zeroable;
-    use nullsweep_ipc_types::{EventKind, Fault, JoinRule, Reason, status};
-
-    use super::*;
-    use crate::cycle::Order;
-    use crate::guard::tests::pr2;
-    use crate::hardware::Loopback;
-    use crate::testing::{HOME, MS, moved, plan};
-
-    /// A held joint that moves while a plan runs stops the arm on its path; a whole turn, a small
-    /// drift, or a move at rest does not.
-    #[test]
-    fn a_moving_torso_stops_the_arm() {
-        for (by, stops) in [(0.015, false), (TAU, false), (0.05, true), (f64::NAN, true)] {
-            let guard = pr2();
-            let slots = Arc::new(Slots::default());
-            let mut states = JointStates {
-                joint_count: 7,
-                held_count: 2,
-                status: status::CALIBRATED,
-                stamp_ns: 1,
-                ..JointStates::zeroed()
-            };
-            states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
-            let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
-            let mut run = |cycles: std::ops::Range<u64>, torso: f64| {
-                for cycle in cycles {
-                    driver.hardware().state.held_positions[1] = torso;
-                    driver.cycle(Wake { deadline_ns: cycle * MS, now_ns: cycle * MS, missed: 0 });
-                }
-            };
-            run(1..10, 0.0);
-            run(10..20, 0.3);
-            let points = [(0, HOME), (400 * MS, moved(HOME, 0, 0.4))];
-            slots.offers.push(plan(&guard, 1, JoinRule::StopThenStart, &points)).unwrap();
-            run(20..120, 0.3);
-            run(120..600, 0.3 + by);
-            let end = std::iter::from_fn(|| slots.events.pop()).last().unwrap();
-            if stops {
-                assert_eq!((end.kind, end.why.reason), (EventKind::Aborted, Reason::HeldJoint));
-                assert_eq!(driver.state().snapshot().fault, Fault::HeldJoint);
-            } else {
-                assert_eq!(end.kind, EventKind::Finished, "{by}");
-            }
-            assert_eq!(driver.mode(), Mode::Hold, "{by}");
-        }
-    }
-
-    /// A rehearsal leaves no trace: the same setpoints, events and answers with it as without.
-    #[test]
-    fn a_rehearsed_loop_does_the_same() {
-        let run = |rehearsed: bool| {
-            let guard = pr2();
-            let slots = Arc::new(Slots::default());
-            let mut states = JointStates {
-                joint_count: 7,
-                status: status::CALIBRATED,
-                stamp_ns: 1,
-                ..JointStates::zeroed()
-            };
-            states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
-            let mut driver = Driver::new(Loopback::new(states, 2), guard, slots.clone());
-            let (mut seen, mut replies) = (Vec::new(), Vec::new());
-            for cycle in 1..1100 {
-                match cycle {
-                    20 | 300 => {
-                        let (near, far) = (HOME, moved(HOME, 0, 0.4));
-                        let (from, to) = if cycle == 20 { (near, far) } else { (far, near) };
-                        let points = [(0, from), (400 * MS, to)];
-                        let plan = plan(&guard, cycle, JoinRule::AfterCurrent, &points);
-                        slots.offers.push(plan).unwrap();
-                    }
-                    100 => slots.asks.push(Ask { ticket: 1, order: Order::Pause }).unwrap(),
-                    200 => slots.asks.push(Ask { ticket: 2, order: Order::Resume }).unwrap(),
-                    _ => {}
-                }
-                let wake = Wake { deadline_ns: cycle * MS, now_ns: cycle * MS, missed: 0 };
-                if rehearsed {
-                    driver.rehearse(wake.deadline_ns);
-                    driver.rehearse(wake.deadline_ns);
-                }
-                driver.cycle(wake);
-                seen.push(driver.hardware().state);
-                replies.extend(std::iter::from_fn(|| slots.replies.pop()));
-            }
-            let events: Vec<_> = std::iter::from_fn(|| slots.events.pop())
-                .map(|e| (e.plan, e.kind, e.why.reason))
-                .collect();
-            (seen, replies, events)
-        };
-        let (rehearsed, plain) = (run(true), run(false));
-        assert_eq!(rehearsed, plain);
-        assert!(plain.2.len() == 6 && plain.1.len() == 2, "{:?}", plain.2);
-    }
-}
+mod tests;

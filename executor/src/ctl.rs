@@ -1,0 +1,144 @@
+//! `executor ctl`: an operator's commands.
+//!
+//! A stop goes to the process as a signal, before all else: whatever is wrong with shared memory or
+//! with the other clients, the arm stops. Then it is asked as every other command is, to tell how it
+//! was taken; that takes a bounded time.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use nullsweep_ipc_types::ports::{Ipc, IpcError, within};
+use nullsweep_ipc_types::{CommandKind, Fault, Mode, Response, Verdict};
+
+use crate::log::last_words;
+use crate::pidfile::Running;
+use crate::system::SystemArgs;
+
+/// How long an answer is waited for.
+const ANSWER_WITHIN: Duration = Duration::from_secs(1);
+/// How long a command may take with everything that has to be opened for it.
+const COMMAND_WITHIN: Duration = Duration::from_secs(10);
+/// What to do where it takes longer.
+const HANGS: &str = "something of iceoryx2's hangs: look for files of length 0 in /dev/shm and for \
+                     processes of this robot that are stopped";
+
+#[derive(Debug, Args)]
+pub(crate) struct CtlArgs {
+    #[command(flatten)]
+    system: SystemArgs,
+    #[command(subcommand)]
+    order: Ctl,
+}
+
+#[derive(Clone, Copy, Debug, Subcommand)]
+enum Ctl {
+    /// Slow down to a stand-still on the path and keep the plan.
+    Pause,
+    /// Go on; after a halt or a disable, allow motion again.
+    Resume,
+    /// Ramp the speed to this percentage.
+    Speed {
+        /// 0 to 100.
+        percent: f64,
+    },
+    /// Slow down on the path, drop the plan, hold. Goes to the executor as a signal first, so it
+    /// stops also where no command can be sent.
+    Stop {
+        /// Then ask the endpoint to disable its motors.
+        #[arg(long)]
+        disable: bool,
+        /// Only send the signal, to the process of this number.
+        #[arg(long, value_name = "PID")]
+        pid: Option<i32>,
+    },
+    /// Clear a latched fault; the arm then holds where it is measured.
+    Reset,
+    /// Tell mode, fault, plan and speed.
+    Status,
+}
+
+/// Sends a command and tells how it was taken.
+pub(crate) fn command(args: &CtlArgs) -> anyhow::Result<ExitCode> {
+    let SystemArgs { robot_name, ipc_root } = &args.system;
+    let (kind, value) = match args.order {
+        Ctl::Pause => (CommandKind::Pause, 0.0),
+        Ctl::Resume => (CommandKind::Resume, 0.0),
+        Ctl::Speed { percent } => (CommandKind::Speed, percent / 100.0),
+        Ctl::Stop { disable, pid: Some(pid) } => {
+            let process = || format!("process {pid}");
+            let running = Running::of_pid(pid).with_context(process)?;
+            running.stop(disable).with_context(process)?;
+            tell(&format!("stop sent to process {pid} as a signal"));
+            return Ok(ExitCode::SUCCESS);
+        }
+        Ctl::Stop { disable: false, pid: None } => (CommandKind::Stop, 0.0),
+        Ctl::Stop { disable: true, pid: None } => (CommandKind::StopAndDisable, 0.0),
+        Ctl::Reset => (CommandKind::Reset, 0.0),
+        Ctl::Status => (CommandKind::Status, 0.0),
+    };
+    let signalled = match args.order {
+        Ctl::Stop { disable, .. } => Running::find(robot_name, ipc_root.as_deref())
+            .filter(|running| running.stop(disable).is_ok()),
+        _ => None,
+    };
+    let (robot, root) = (robot_name.clone(), ipc_root.clone());
+    let response = within(COMMAND_WITHIN, move || ask(&robot, root.as_deref(), kind, value))
+        .context(HANGS)
+        .and_then(|answer| Ok(answer?));
+    match (response, signalled) {
+        (Ok(response), _) => {
+            tell(&Answer(&response).to_string());
+            let accepted = Verdict::from_wire(response.verdict) == Some(Verdict::Accepted);
+            Ok(if accepted { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+        }
+        (Err(e), Some(running)) => {
+            tell(&format!("stop sent to process {} as a signal", running.pid));
+            last_words(&format!(
+                "executor: the stop was sent, but how it was taken is not known: {e:#}"
+            ));
+            Ok(ExitCode::SUCCESS)
+        }
+        (Err(e), None) => Err(e),
+    }
+}
+
+fn ask(
+    robot: &str,
+    root: Option<&Path>,
+    kind: CommandKind,
+    value: f64,
+) -> Result<Response, IpcError> {
+    let ipc = Ipc::open(robot, root)?;
+    ipc.command_client()?.call(kind, value, ANSWER_WITHIN)
+}
+
+/// Done is done, also where the answer cannot be shown: the exit code tells it too.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// A response in words.
+struct Answer<'a>(&'a Response);
+
+impl std::fmt::Display for Answer<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let response = self.0;
+        let unknown = "unknown";
+        let verdict = Verdict::from_wire(response.verdict).map_or(unknown, Verdict::text);
+        let mode = Mode::from_wire(response.mode).map_or(unknown, Mode::text);
+        write!(f, "{verdict}: {mode}")?;
+        match Fault::from_wire(response.fault) {
+            Some(Fault::None) => {}
+            Some(fault) => write!(f, ", {fault}")?,
+            None => write!(f, ", fault {}", response.fault)?,
+        }
+        if response.plan.is_some() {
+            write!(f, ", plan {} at knot {}", response.plan, response.knot)?;
+        }
+        write!(f, ", speed {:.0} %", response.speed_scale * 100.0)
+    }
+}

@@ -1,0 +1,17 @@
+//! Which robot's system a command line means.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nullsweep_ipc_types::service;
+
+/// The robot and the folder of its services.
+#[derive(Debug, Args)]
+pub(crate) struct SystemArgs {
+    /// The robot's name in the services' names.
+    #[arg(long, default_value = service::DEFAULT_ROBOT)]
+    pub(crate) robot_name: String,
+    /// Folder that isolates this system from others on the machine.
+    #[arg(long, value_name = "PATH")]
+    pub(crate) ipc_root: Option<PathBuf>,
+}
