@@ -33,6 +33,7 @@ mod swaps;
 mod system;
 #[cfg(test)]
 mod testing;
+mod top;
 mod total;
 mod words;
 mod worker;

@@ -141,6 +141,7 @@ pub(crate) const APART: &[(&str, &str, &[&str])] = &[
 pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("parry3d-f64", &["planner/collision"]),
     ("clap", &["planner/cli", "executor", "tests", "pr2-bridge"]),
+    ("ratatui", &["executor/src/top"]),
     ("indicatif", &["planner/cli"]),
     ("plotly", &["planner/report", "tests"]),
     ("plotters", &["planner/experiment"]),
