@@ -22,6 +22,8 @@ mod ids;
 mod interpolate;
 mod journal;
 mod log;
+#[cfg(all(test, feature = "model"))]
+mod models;
 mod path;
 mod pidfile;
 mod record;
@@ -30,6 +32,7 @@ mod service;
 mod slots;
 #[cfg(test)]
 mod swaps;
+mod sync;
 mod system;
 #[cfg(test)]
 mod testing;

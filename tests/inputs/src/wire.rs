@@ -21,13 +21,13 @@ use crate::arm::arm;
 use crate::script::{Deed, deed};
 
 /// The least deeds of a script are none, the most these.
-const DEEDS: usize = 64;
+const DEEDS: usize = 32;
 /// Bytes of a deed, with the cycles before it.
 const DEED: usize = 3;
 /// Plans of one run.
 const PLANS: usize = 4;
 /// Cycles after the last deed.
-const AFTER: u32 = 3000;
+const AFTER: u32 = 400;
 /// When the executor started, and when the run begins. \[ns\]
 const START: u64 = 1_000;
 const NOW: u64 = 10_000_000_000;
@@ -45,7 +45,7 @@ pub(crate) fn run(bytes: &[u8]) -> bool {
     let mut offers = plans.into_iter().flatten();
     let mut offered = 0;
     for part in script.chunks_exact(DEED) {
-        stage.run(u32::from(part[0]) * 8);
+        stage.run(u32::from(part[0]) * 2);
         match deed([part[1], part[2]]) {
             Deed::Order(order) => stage.tick(Some(order), None),
             Deed::Offer => {
@@ -238,13 +238,13 @@ pub(crate) fn made() -> Vec<Vec<u8>> {
 fn message(number: u64, interpolation: Interpolation, join_rule: u32) -> Vec<u8> {
     let arm = &arm().1;
     let reach =
-        if interpolation == Interpolation::Cubic { [0.1, 0.05, 0.1] } else { [0.0, 0.05, 0.1] };
+        if interpolation == Interpolation::Cubic { [0.04, 0.02, 0.04] } else { [0.0, 0.02, 0.04] };
     let knots: Vec<Knot> = reach
         .iter()
         .enumerate()
         .map(|(k, q)| {
             let mut knot = Knot::zeroed();
-            knot.time_from_start_ns = 400_000_000 * k as u64;
+            knot.time_from_start_ns = 200_000_000 * k as u64;
             knot.positions[0] = *q;
             knot.positions[2] = -q;
             knot
