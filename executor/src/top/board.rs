@@ -33,8 +33,8 @@ pub(super) struct Board {
     pub(super) answer: String,
     /// Why nothing is heard, where that is known.
     pub(super) trouble: Option<String>,
-    /// The speed scale that was asked for here.
-    speed: Option<f64>,
+    /// Deadlines that the last line says were missed.
+    streak: u64,
     seen: Seen,
 }
 
@@ -68,7 +68,7 @@ impl Board {
             log: VecDeque::with_capacity(LINES),
             answer: String::new(),
             trouble: None,
-            speed: None,
+            streak: 0,
             seen: Seen::default(),
         }
     }
@@ -112,20 +112,16 @@ impl Board {
             }
         }
         if !began && missed > before.missed {
-            self.say(format!("{} deadlines missed", missed - before.missed));
+            // One line, however many follow each other.
+            let streak = self.streak + missed - before.missed;
+            if self.streak > 0 {
+                self.log.pop_back();
+            }
+            self.say(format!("deadlines missed: {streak}"));
+            self.streak = streak;
         }
         self.trouble = None;
         self.newest = Some((telemetry, now));
-    }
-
-    /// The speed scale to ask for: `by` more than what was asked for here before, or is in force.
-    pub(super) fn ask_speed(&mut self, by: f64) -> f64 {
-        let now = self.newest.as_ref().map_or(1.0, |(telemetry, _)| telemetry.speed_scale);
-        let asked = self.speed.unwrap_or(now) + by;
-        // Also for a NaN off the wire.
-        let speed = if asked > 0.0 { asked.min(1.0) } else { 0.0 };
-        self.speed = Some(speed);
-        speed
     }
 
     /// Takes a plan's event in.
@@ -155,6 +151,7 @@ impl Board {
     }
 
     fn say(&mut self, line: String) {
+        self.streak = 0;
         if self.log.len() == LINES {
             self.log.pop_front();
         }

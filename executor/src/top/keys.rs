@@ -17,6 +17,13 @@ pub(super) enum Deed {
     Quit,
 }
 
+/// The scale that is asked for where it is to be so much faster.
+pub(super) fn faster(scale: f64, by: f64) -> f64 {
+    let asked = scale + by;
+    // Also for a NaN off the wire.
+    if asked > 0.0 { asked.min(1.0) } else { 0.0 }
+}
+
 /// What a key means, if anything.
 pub(super) fn deed(key: KeyEvent) -> Option<Deed> {
     let control = key.modifiers.contains(KeyModifiers::CONTROL);

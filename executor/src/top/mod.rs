@@ -16,6 +16,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use nullsweep_ipc_types::CommandKind;
 use nullsweep_robot::Arm;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 
@@ -52,10 +53,14 @@ pub(crate) fn top(args: &TopArgs, arm: &Arm) -> io::Result<ExitCode> {
         }
         match deed(now + PICTURE) {
             Ok(Some(Deed::Quit)) => break Ok(ExitCode::SUCCESS),
-            Ok(Some(Deed::Command(kind))) => watch.command(kind, 0.0, &mut board),
+            Ok(Some(Deed::Command(kind))) => {
+                watch.command(kind, 0.0, &mut board);
+            }
             Ok(Some(Deed::Speed(by))) => {
-                let speed = board.ask_speed(by);
-                watch.command(nullsweep_ipc_types::CommandKind::Speed, speed, &mut board);
+                // What is in force says nothing while the arm rests: ask for what was asked for.
+                if let Some(scale) = watch.command(CommandKind::Status, 0.0, &mut board) {
+                    watch.command(CommandKind::Speed, keys::faster(scale, by), &mut board);
+                }
             }
             Ok(None) => {}
             Err(error) => break Err(error),

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::ports::{CommandClient, Ipc, IpcError, PortError, Receiver};
-use nullsweep_ipc_types::{CommandKind, PlanEvent, Telemetry, Verdict};
+use nullsweep_ipc_types::{CommandKind, PlanEvent, Response, Telemetry, Verdict};
 
 use super::board::Board;
 use crate::system::SystemArgs;
@@ -53,16 +53,28 @@ impl Watch {
         board.look(now);
     }
 
-    /// Sends a command and tells the board how it was taken.
-    pub(super) fn command(&mut self, kind: CommandKind, value: f64, board: &mut Board) {
-        let Some(ports) = &mut self.ports else {
-            board.answer = format!("{kind:?}: there is no executor");
-            return;
+    /// Sends a command and tells the board how it was taken; the speed scale that is asked for
+    /// from then on.
+    pub(super) fn command(
+        &mut self,
+        kind: CommandKind,
+        value: f64,
+        board: &mut Board,
+    ) -> Option<f64> {
+        let answer = match &mut self.ports {
+            Some(ports) => ports.command(kind, value).map_err(|error| error.to_string()),
+            None => Err("there is no executor".into()),
         };
-        board.answer = match ports.command(kind, value) {
-            Ok(verdict) => format!("{kind:?}: {verdict}"),
+        let verdict =
+            |r: &Response| Verdict::from_wire(r.verdict).map_or("unknown answer", Verdict::text);
+        board.answer = match &answer {
+            Ok(response) if kind == CommandKind::Speed => {
+                format!("{kind:?} {:.0} %: {}", 100.0 * response.speed_scale, verdict(response))
+            }
+            Ok(response) => format!("{kind:?}: {}", verdict(response)),
             Err(error) => format!("{kind:?}: {error}"),
         };
+        answer.ok().map(|response| response.speed_scale)
     }
 }
 
@@ -83,7 +95,7 @@ impl Ports {
         Ok(())
     }
 
-    fn command(&mut self, kind: CommandKind, value: f64) -> Result<&'static str, IpcError> {
+    fn command(&mut self, kind: CommandKind, value: f64) -> Result<Response, IpcError> {
         let client = match self.commands.take() {
             Some(client) => client,
             None => self.ipc.command_client()?,
@@ -91,6 +103,6 @@ impl Ports {
         let answer = client.call(kind, value, ANSWER_WITHIN)?;
         // Kept only where it has been answered: another executor is another server.
         self.commands = Some(client);
-        Ok(Verdict::from_wire(answer.verdict).map_or("unknown answer", Verdict::text))
+        Ok(answer)
     }
 }
