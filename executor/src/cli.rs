@@ -22,6 +22,7 @@ use crate::pidfile::{PidFile, PidFileError};
 use crate::record::replay;
 use crate::rt::probe_cpu;
 use crate::system::SystemArgs;
+use crate::top::{TopArgs, top};
 
 /// Real-time executor: streams joint setpoints of published plans to a hardware endpoint.
 #[derive(Debug, Parser)]
@@ -42,6 +43,8 @@ enum Action {
     Run(Box<RunArgs>),
     /// Send a command to a running executor.
     Ctl(CtlArgs),
+    /// Watch a running executor on a live screen; keys pause, resume, stop and change the speed.
+    Top(TopArgs),
     /// Replay a flight recording and compare every setpoint bit for bit.
     Replay {
         /// A file that `run --record` wrote.
@@ -135,6 +138,8 @@ where
     let result = match cli.command {
         Action::Run(args) => run_command(&args),
         Action::Ctl(args) => ctl::command(&args),
+        Action::Top(args) => arm(args.urdf.as_deref(), &args.arm)
+            .and_then(|arm| top(&args, &arm).context("the screen")),
         Action::Replay { file } => replay_command(&file),
     };
     match result {
@@ -155,7 +160,7 @@ fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {
 
 fn run_logged(args: &RunArgs, lost_lines: Arc<AtomicU64>) -> anyhow::Result<ExitCode> {
     let alarm = Alarm::install()?;
-    let arm = arm(args)?;
+    let arm = arm(args.urdf.as_deref(), &args.arm)?;
     let config = Config { lost_lines, ..config(args, &arm)? };
     tracing::info!(
         "executor for robot `{}`: {} joints from {} to {}, {} Hz, process {}",
@@ -180,13 +185,13 @@ fn run_logged(args: &RunArgs, lost_lines: Arc<AtomicU64>) -> anyhow::Result<Exit
     Ok(ExitCode::SUCCESS)
 }
 
-fn arm(args: &RunArgs) -> anyhow::Result<Arm> {
-    let robot = match &args.urdf {
+fn arm(urdf: Option<&Path>, arm: &str) -> anyhow::Result<Arm> {
+    let robot = match urdf {
         Some(path) => Robot::from_urdf_file(path)
             .with_context(|| format!("cannot read the robot from {}", path.display()))?,
         None => Robot::pr2(),
     };
-    let spec = match args.arm.as_str() {
+    let spec = match arm {
         "right" => ArmSpec::pr2(Side::Right),
         "left" => ArmSpec::pr2(Side::Left),
         links => match links.split_once(':') {
@@ -194,7 +199,7 @@ fn arm(args: &RunArgs) -> anyhow::Result<Arm> {
             None => bail!(Usage(format!("--arm takes right, left or BASE:TIP, not {links}"))),
         },
     };
-    robot.arm(&spec).with_context(|| format!("arm `{}` of robot `{}`", args.arm, robot.name()))
+    robot.arm(&spec).with_context(|| format!("arm `{arm}` of robot `{}`", robot.name()))
 }
 
 fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {

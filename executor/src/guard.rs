@@ -75,10 +75,6 @@ pub struct Guard {
 impl Guard {
     /// Default of [`Self::start_tolerance`]. \[rad\]
     pub const START_TOLERANCE: f64 = 0.02;
-    /// How far from 0 a plan's joint may be, continuous ones too: some 160 turns. Further out whole
-    /// turns cannot be told from others to the last digits that the start tolerance needs.
-    /// \[rad\] or \[m\]
-    pub const FARTHEST: f64 = 1000.0;
     /// The least share of its acceleration with which a joint is led to a first knot.
     pub const APPROACH: f64 = 0.1;
     /// Default of [`Self::goal_tolerance`]. \[rad\]

@@ -22,6 +22,8 @@ mod ids;
 mod interpolate;
 mod journal;
 pub mod log;
+#[cfg(all(test, feature = "model"))]
+mod models;
 mod path;
 mod pidfile;
 mod record;
@@ -30,9 +32,11 @@ mod service;
 mod slots;
 #[cfg(test)]
 mod swaps;
+mod sync;
 mod system;
 #[cfg(test)]
 mod testing;
+mod top;
 mod total;
 mod words;
 mod worker;

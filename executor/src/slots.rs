@@ -3,16 +3,16 @@
 //! aside in the middle of it, as it may with queues that several threads put into.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 
 use nullsweep_ipc_types::HISTOGRAM_BUCKETS;
-use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::admit::{Held, ValidPlan};
 use crate::cycle::{Ask, EVENTS, Event, Reply, Snapshot};
+use crate::sync::{AtomicU64, Consumer, Producer, RingBuffer};
 
 /// Events that may wait for the service thread.
-const EVENT_ROOM: usize = 512;
+const EVENT_ROOM: usize = if cfg!(feature = "model") { 4 * EVENTS + 2 } else { 512 };
 /// Positions of held joints that may wait for the worker.
 pub(crate) const HELD_ROOM: usize = 64;
 

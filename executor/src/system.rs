@@ -6,7 +6,7 @@ use clap::Args;
 use nullsweep_ipc_types::service;
 
 /// The robot and the folder of its services.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct SystemArgs {
     /// The robot's name in the services' names.
     #[arg(long, default_value = service::DEFAULT_ROBOT)]

@@ -79,7 +79,7 @@ pub struct Knot {
     /// Time since the plan's start. \[ns\]
     pub time_from_start_ns: u64,
     /// Joint positions; continuous joints are unwrapped along the whole plan, and none is further
-    /// from 0 than 1000. \[rad\] or \[m\]
+    /// from 0 than [`Self::FARTHEST`]. \[rad\] or \[m\]
     pub positions: JointArray,
     /// Joint velocities, used by [`Interpolation::Cubic`], else zero. \[rad/s\] or \[m/s\]
     pub velocities: JointArray,
@@ -93,6 +93,12 @@ assert_layout!(Knot, 272);
 impl Knot {
     /// A knot's `patch` where it sweeps none.
     pub const NO_PATCH: u32 = u32::MAX;
+    /// How far from 0 a joint may be, continuous ones too: some 160 turns. Further out whole turns
+    /// cannot be told from others to the last digits that the start tolerance needs.
+    /// \[rad\] or \[m\]
+    pub const FARTHEST: f64 = 1000.0;
+    /// The latest time: whole nanoseconds that an `f64` holds, 104 days. \[ns\]
+    pub const LATEST_NS: u64 = 1 << 53;
 }
 
 /// What the executor must know of a plan before it admits it.

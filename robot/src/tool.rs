@@ -1,7 +1,12 @@
 //! The tool that touches the surface: a rectangular pad at the end of the arm.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
+};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::arm::Arm;
 use crate::joints::JointVector;
@@ -11,8 +16,10 @@ use crate::joints::JointVector;
 /// Its *contact frame* has the pad's centre as origin, x along the direction of travel, z into
 /// the surface (against the surface normal) and y = z × x along the pad's long side, so that the
 /// pad moves across its long side (paper §I).
+///
+/// One that is read from a file has passed [`Tool::check`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(remote = "Self", deny_unknown_fields)]
 pub struct Tool {
     /// For people.
     pub name: String,
@@ -67,7 +74,100 @@ impl Default for Tool {
     }
 }
 
+/// Sides of a pad, least and greatest. \[m\]
+const SIDE: (f64, f64) = (1e-4, 10.0);
+/// Farthest from the tip frame, and from the surface. \[m\]
+const FAR: f64 = 10.0;
+/// Least sine of the angle between two axes that span a plane.
+const SPREAD: f64 = 0.01;
+
+/// Why there cannot be such a tool.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ToolError {
+    /// A number is out of its range, or none.
+    #[error("tool: {field} is {value} {unit}: {low} to {high} {unit} is wanted")]
+    Range {
+        /// Which field.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// The least.
+        low: f64,
+        /// The greatest.
+        high: f64,
+    },
+    /// An axis that points nowhere.
+    #[error(
+        "tool: {field} is {axis:?}: an axis is wanted, three finite numbers that are not all 0"
+    )]
+    Axis {
+        /// Which field.
+        field: &'static str,
+        /// What it is.
+        axis: [f64; 3],
+    },
+    /// The two axes are parallel.
+    #[error("tool: approach {approach:?} and across {across:?} are parallel: turn one of them")]
+    Parallel {
+        /// The one into the surface.
+        approach: [f64; 3],
+        /// The one along the pad's long side.
+        across: [f64; 3],
+    },
+}
+
+impl Serialize for Tool {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, out)
+    }
+}
+
+impl<'de> Deserialize<'de> for Tool {
+    fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
+        let tool = Self::deserialize(input)?;
+        tool.check().map_err(D::Error::custom)?;
+        Ok(tool)
+    }
+}
+
 impl Tool {
+    /// Whether there can be such a tool: a pad with sides, near the tip, with two axes.
+    ///
+    /// # Errors
+    /// The first field that is out of its range.
+    pub fn check(&self) -> Result<(), ToolError> {
+        let [x, y, z] = self.centre;
+        for (field, value, unit, (low, high)) in [
+            ("length", self.length, "m", SIDE),
+            ("width", self.width, "m", SIDE),
+            ("thickness", self.thickness, "m", SIDE),
+            ("centre[0]", x, "m", (-FAR, FAR)),
+            ("centre[1]", y, "m", (-FAR, FAR)),
+            ("centre[2]", z, "m", (-FAR, FAR)),
+            ("stand_off", self.stand_off, "m", (-FAR, FAR)),
+            ("reach_normal", self.reach_normal, "m", (0.0, FAR)),
+            ("reach_angle", self.reach_angle, "rad", (0.0, PI)),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(ToolError::Range { field, value, unit, low, high });
+            }
+        }
+        let (approach, across) = (self.approach, self.across);
+        let direction = |field, axis: [f64; 3]| {
+            Unit::try_new(Vector3::from(axis), 1e-6)
+                // Beyond 1e154 a norm overflows, and nothing is left of the direction.
+                .filter(|unit| (unit.norm() - 1.0).abs() < 1e-6)
+                .ok_or(ToolError::Axis { field, axis })
+        };
+        let (into, along) = (direction("approach", approach)?, direction("across", across)?);
+        if into.cross(&along).norm() < SPREAD {
+            return Err(ToolError::Parallel { approach, across });
+        }
+        Ok(())
+    }
+
     /// The pose of the contact frame in the arm's tip frame.
     #[must_use]
     pub fn contact_in_tip(&self) -> Isometry3<f64> {
@@ -109,5 +209,49 @@ impl Mounted<'_> {
     #[inline]
     pub fn centre(&self, q: &JointVector) -> Point3<f64> {
         Point3::from(self.pose(q).translation.vector)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Spoil = fn(&mut Tool);
+
+    #[test]
+    fn a_tool_that_cannot_be_is_refused_by_its_field() {
+        let spoil: [(&str, Spoil); 14] = [
+            ("length is 0 m", |t| t.length = 0.0),
+            ("width is NaN m", |t| t.width = f64::NAN),
+            ("thickness is -0.03 m", |t| t.thickness = -0.03),
+            ("width is inf m", |t| t.width = f64::INFINITY),
+            ("width is 0.00000000000000000001 m", |t| t.width = 1e-20),
+            ("centre[1] is NaN m", |t| t.centre[1] = f64::NAN),
+            ("stand_off is -inf m", |t| t.stand_off = f64::NEG_INFINITY),
+            ("reach_normal is -1 m", |t| t.reach_normal = -1.0),
+            ("reach_angle is 4 rad", |t| t.reach_angle = 4.0),
+            ("approach is [0.0, 0.0, 0.0]", |t| t.approach = [0.0; 3]),
+            ("across is [NaN, 1.0, 0.0]", |t| t.across[0] = f64::NAN),
+            ("across is [1e300, 1e300, 0.0]", |t| t.across = [1e300, 1e300, 0.0]),
+            ("are parallel", |t| t.across = [-2.0, 0.0, 0.0]),
+            ("are parallel", |t| t.across = [1.0, 0.001, 0.0]),
+        ];
+        for (says, spoil) in spoil {
+            let mut tool = Tool::default();
+            assert_eq!(tool.check(), Ok(()));
+            spoil(&mut tool);
+            let said = tool.check().expect_err(says).to_string();
+            assert!(said.contains(says), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_file_tells_only_of_tools_that_can_be() {
+        let text = serde_json::to_string(&Tool::default()).expect("numbers");
+        assert_eq!(serde_json::from_str::<Tool>(&text).expect("a tool"), Tool::default());
+        let thin = text.replace("\"thickness\":0.03", "\"thickness\":-0.03");
+        let said = serde_json::from_str::<Tool>(&thin).expect_err("thinner than nothing");
+        assert!(said.to_string().contains("thickness is -0.03 m"), "{said}");
+        assert!(serde_json::from_str::<Tool>(&text.replace("width", "breadth")).is_err());
     }
 }

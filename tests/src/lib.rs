@@ -9,8 +9,8 @@
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
 //! * [`witness`]: watches an executor from outside.
 //! * [`conformance`]: whether any endpoint keeps what the executor relies on.
-//! * [`latency`]: the latency lab; [`kills`]: the killing lab; [`loopback`]: executor and endpoint
-//!   under a virtual clock.
+//! * [`latency`]: the latency lab; [`kills`]: the killing lab; [`soak`]: hours of all that can
+//!   happen; [`loopback`]: executor and endpoint under a virtual clock.
 
 pub mod arm_args;
 pub mod clock;
@@ -31,6 +31,7 @@ pub mod publisher;
 pub mod record;
 pub mod servo;
 pub mod sketch;
+pub mod soak;
 pub mod stage;
 pub mod system;
 pub mod tracking;

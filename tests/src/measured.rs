@@ -84,6 +84,7 @@ mod tests {
             surface,
             continues: None,
             past: Vec::new(),
+            seal: None,
         }
     }
 

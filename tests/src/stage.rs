@@ -154,6 +154,12 @@ impl Process {
         &self.name
     }
 
+    /// Its number to the system.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Its exit status, `None` while it runs.
     pub fn status(&mut self) -> io::Result<Option<ExitStatus>> {
         if self.status.is_none() {

@@ -23,8 +23,6 @@ pub(crate) use plan::Shape;
 pub use plan::{Join, ValidPlan};
 pub use rejection::Rejection;
 
-/// Plan times are whole nanoseconds in an `f64`. \[ns\]
-const LONGEST_NS: u64 = 1 << 53;
 /// The rate of plan time never changes faster than from 0 to 1 in 20 ms, nor slower than in 1 s.
 const RAMP: (f64, f64) = (1.0, 50.0);
 
@@ -170,17 +168,17 @@ fn read(knots: &[Knot], joints: usize) -> Result<Vec<PlanKnot>, Rejection> {
                 *to = from;
             }
             // A bound that holds also for joints that turn without end.
-            if !(own.q[j].abs() <= Guard::FARTHEST) {
+            if !(own.q[j].abs() <= Knot::FARTHEST) {
                 let far = Rejection::new(Reason::SoftLimit).knot(i).joint(j);
-                return Err(far.value(own.q[j], Guard::FARTHEST.copysign(own.q[j])));
+                return Err(far.value(own.q[j], Knot::FARTHEST.copysign(own.q[j])));
             }
         }
         let order = Rejection::new(Reason::TimeOrder).knot(i);
         match read.last() {
             None if own.time != 0.0 => return Err(order.value(own.time, 0.0)),
             Some(last) if own.time <= last.time => return Err(order.value(own.time, last.time)),
-            _ if knot.time_from_start_ns > LONGEST_NS => {
-                return Err(order.value(own.time, LONGEST_NS as f64));
+            _ if knot.time_from_start_ns > Knot::LATEST_NS => {
+                return Err(order.value(own.time, Knot::LATEST_NS as f64));
             }
             _ => read.push(own),
         }

@@ -314,7 +314,7 @@ fn no_number_passes_a_bound_that_it_does_not_keep() {
                     let speed = top_speed(&pair[0], &pair[1], *kind, j);
                     assert!(speed <= guard.joints[j].velocity(), "{kind}, joint {joint}: {odd}");
                     let (low, high) = reach(&pair[0], &pair[1], *kind, j);
-                    assert!(low >= -Guard::FARTHEST && high <= Guard::FARTHEST, "{kind}: {odd}");
+                    assert!(low >= -Knot::FARTHEST && high <= Knot::FARTHEST, "{kind}: {odd}");
                 }
             }
         }

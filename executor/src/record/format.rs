@@ -192,6 +192,11 @@ pub(crate) fn plan(payload: &[u8]) -> Option<ValidPlan> {
     Some(ValidPlan::new(head.id, join, shape, knots, head.waited))
 }
 
+/// The state after a cycle was handed over as a checkpoint.
+pub(crate) const CHECKPOINT: u32 = 1;
+/// Cycles before one were lost on the way to the worker. No such one is in a recording.
+pub(crate) const HOLE: u32 = 2;
+
 /// One cycle: what [`crate::cycle::step`] got, and the setpoint that it gave.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -205,7 +210,7 @@ pub(crate) struct CycleRecord {
     order: u32,
     has_measured: u32,
     missed: u32,
-    /// 1: the state after this cycle was handed over as a checkpoint.
+    /// Bits of [`CHECKPOINT`] and [`HOLE`].
     pub checkpoint: u32,
     pub target: TargetRecord,
 }

@@ -13,19 +13,18 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-
-use rtrb::{Consumer, Producer, RingBuffer};
+use std::sync::atomic::Ordering;
 
 use crate::admit::ValidPlan;
 use crate::cycle::{Checkpoint, Input, State, Target};
 use crate::guard::Guard;
-use format::{CycleRecord, GuardRecord, MAGIC, PlanRecord, Tag, put};
+use crate::sync::{AtomicBool, AtomicU64, Consumer, Producer, RingBuffer};
+use format::{CHECKPOINT, CycleRecord, GuardRecord, HOLE, MAGIC, PlanRecord, Tag, put};
 
 pub use replay::{ReplayError, Replayed, replay};
 
 /// Cycles that may wait for the worker: four seconds at 1 kHz.
-const WAITING: usize = 4096;
+const WAITING: usize = if cfg!(feature = "model") { 3 } else { 4096 };
 /// Bytes that are gathered before they are written.
 const CHUNK: usize = 64 << 10;
 
@@ -35,6 +34,8 @@ pub(crate) struct Tape {
     cycles: Producer<CycleRecord>,
     checkpoints: Producer<Checkpoint>,
     shared: Arc<Shared>,
+    /// The last cycle was lost.
+    hole: bool,
 }
 
 /// What lies between the two ends beside the queues.
@@ -55,16 +56,24 @@ impl Tape {
     /// After it: adds what it gave and hands it on, with the loop's memory where one is wanted.
     pub(crate) fn push(&mut self, mut record: CycleRecord, target: Option<&Target>, state: &State) {
         record.target = target.into();
+        // Asked first: a checkpoint whose cycle is lost would be in the way of all later ones.
+        if self.cycles.is_full() {
+            self.hole = true;
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
+        if std::mem::take(&mut self.hole) {
+            record.checkpoint |= HOLE;
+        }
         if self.shared.wanted.load(Ordering::Relaxed)
             && let Some(checkpoint) = state.checkpoint()
             && self.checkpoints.push(checkpoint).is_ok()
         {
-            record.checkpoint = 1;
+            record.checkpoint |= CHECKPOINT;
             self.shared.wanted.store(false, Ordering::Relaxed);
         }
-        if self.cycles.push(record).is_err() {
-            self.shared.lost.fetch_add(1, Ordering::Relaxed);
-        }
+        // There is room: nobody else puts in.
+        let _ = self.cycles.push(record);
     }
 }
 
@@ -93,7 +102,8 @@ impl Recorder {
         let (cycle, cycles) = RingBuffer::new(WAITING);
         let (checkpoint, checkpoints) = RingBuffer::new(1);
         let shared = Arc::new(Shared { wanted: AtomicBool::new(true), lost: AtomicU64::new(0) });
-        let tape = Tape { cycles: cycle, checkpoints: checkpoint, shared: shared.clone() };
+        let tape =
+            Tape { cycles: cycle, checkpoints: checkpoint, shared: shared.clone(), hole: false };
         let recorder = Self {
             cycles,
             checkpoints,
@@ -126,21 +136,18 @@ impl Recorder {
 
     /// Writes what the loop handed on.
     pub(crate) fn round(&mut self) -> io::Result<()> {
-        let lost = self.shared.lost.load(Ordering::Relaxed);
-        if lost > self.lost {
-            // A recording with a hole cannot be replayed past it: begin anew.
-            tracing::warn!("flight recorder: {} cycles were not written", lost - self.lost);
-            self.lost = lost;
-            self.finish()?;
-            self.want_checkpoint();
-        }
         for _ in 0..WAITING {
-            let Ok(record) = self.cycles.pop() else { break };
+            let Ok(mut record) = self.cycles.pop() else { break };
+            // Told by the cycle itself: a count that is read beforehand may be of too early.
+            if record.checkpoint & HOLE != 0 {
+                self.begin_anew()?;
+                record.checkpoint &= !HOLE;
+            }
             if self.file.is_some() {
                 put(&mut self.buffer, Tag::Cycle, &[bytemuck::bytes_of(&record)]);
             }
             self.offered.retain(|p| p.id() != record.offer);
-            if record.checkpoint != 0
+            if record.checkpoint & CHECKPOINT != 0
                 && let Ok(checkpoint) = self.checkpoints.pop()
             {
                 self.change_over(&checkpoint)?;
@@ -157,6 +164,15 @@ impl Recorder {
             self.finish()?;
         }
         Ok(())
+    }
+
+    /// A recording with a hole cannot be replayed past it: ends it before the hole.
+    fn begin_anew(&mut self) -> io::Result<()> {
+        let lost = self.shared.lost.load(Ordering::Relaxed);
+        tracing::warn!("flight recorder: {} cycles were not written", lost - self.lost);
+        self.lost = lost;
+        self.want_checkpoint();
+        self.finish()
     }
 
     /// Writes what is left.

@@ -9,3 +9,4 @@ mod recording;
 mod replaced;
 mod rig;
 mod stop;
+mod strangers;

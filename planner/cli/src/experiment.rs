@@ -17,6 +17,7 @@ use crate::bars::Bars;
 use crate::choices::ObjectArg;
 use crate::exit::OK;
 use crate::json::write_json;
+use crate::numbers::not_negative;
 use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
@@ -43,7 +44,7 @@ pub(super) struct ExperimentArgs {
     #[arg(long)]
     symmetric: bool,
     /// Weight of turning against distance in the Curvature-GTSP (Eq. 4).
-    #[arg(long, default_value_t = FormulationConfig::default().beta)]
+    #[arg(long, default_value_t = FormulationConfig::default().beta, value_parser = not_negative)]
     beta: f64,
     /// Seed of the first run: the object's noise and patches, too.
     #[arg(long, default_value_t = 1)]

@@ -7,6 +7,7 @@ use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nullsweep_planner::cost::{Effort, of_path};
 use nullsweep_planner::plan::Plan;
+use nullsweep_robot::MAX_DOF;
 use serde::Serialize;
 
 use crate::exit::OK;
@@ -60,7 +61,7 @@ pub(super) fn run(args: &InspectArgs) -> anyhow::Result<u8> {
 
 fn summarise(plan: &Plan) -> Summary {
     let path: Vec<_> = plan.knots.iter().map(|k| k.q).collect();
-    let joints = plan.joints.iter().enumerate().map(|(j, name)| {
+    let joints = plan.joints.iter().take(MAX_DOF).enumerate().map(|(j, name)| {
         let values = path.iter().map(|q| q[j]);
         JointSummary {
             name: name.clone(),

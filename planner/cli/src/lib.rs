@@ -9,6 +9,7 @@ mod export;
 mod gtsp;
 mod inspect;
 mod json;
+mod numbers;
 mod picture;
 mod plan;
 mod publish;

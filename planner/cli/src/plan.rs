@@ -22,10 +22,11 @@ use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg};
 use crate::exit::OK;
 use crate::json::write_json;
+use crate::numbers::{Numbers, finite, not_negative, positive, velocity};
 use crate::picture::picture;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
-use crate::scene::{Demo, Numbers, SceneArgs, scene};
+use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -48,14 +49,14 @@ pub(super) struct PlanArgs {
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     base: Base,
     /// Height of the PR2's torso joint, with a given base. [m]
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = finite)]
     torso: Option<f64>,
     /// Position of another held joint: NAME=VALUE.
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
     held: Vec<HeldArg>,
     /// Where the arm starts: its joints, comma-separated; without it a posture that the SRDF names
     /// (home before others), or the middle of its ranges, or the nearest free of collision.
-    #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true, value_delimiter = ',')]
+    #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true, value_delimiter = ',', value_parser = finite)]
     start: Vec<f64>,
 
     /// Go on from knot K of a plan, for the patches that it has not swept by then.
@@ -75,23 +76,23 @@ pub(super) struct PlanArgs {
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1000))]
     ik_samples: u32,
     /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
-    #[arg(long)]
+    #[arg(long, value_parser = velocity)]
     v_max: Option<f64>,
     /// How fast the plan goes along its path: at bang-bang velocity, or as fast as velocity and
     /// acceleration allow, corners blended within the line's tolerance.
     #[arg(long, value_enum, default_value = "velocity")]
     profile: ProfileArg,
     /// Radius of a patch's neighbourhood. [m]
-    #[arg(long, default_value_t = PatchConfig::default().epsilon)]
+    #[arg(long, default_value_t = PatchConfig::default().epsilon, value_parser = positive)]
     patch_radius: f64,
     /// Nearest neighbours of each patch that are tried as edges.
     #[arg(long, default_value_t = GraphConfig::default().neighbours)]
     neighbours: usize,
     /// Longest edge. [m]
-    #[arg(long, default_value_t = GraphConfig::default().radius)]
+    #[arg(long, default_value_t = GraphConfig::default().radius, value_parser = positive)]
     radius: f64,
     /// Weight of turning against distance in the Curvature-GTSP (Eq. 4).
-    #[arg(long, default_value_t = FormulationConfig::default().beta)]
+    #[arg(long, default_value_t = FormulationConfig::default().beta, value_parser = not_negative)]
     beta: f64,
     /// Trials of the order's search for each patch.
     #[arg(long, default_value_t = FormulationConfig::default().trials_per_cluster)]
@@ -136,7 +137,7 @@ impl FromStr for HeldArg {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, value) = text.split_once('=').ok_or("NAME=VALUE is wanted")?;
-        Ok(Self(name.into(), value.parse().map_err(|e| format!("`{value}`: {e}"))?))
+        Ok(Self(name.into(), finite(value).map_err(|e| format!("`{value}`: {e}"))?))
     }
 }
 

@@ -10,6 +10,7 @@ use nullsweep_planner::plan::Plan;
 
 use crate::choices::JoinArg;
 use crate::exit::OK;
+use crate::numbers::seconds;
 
 #[derive(Debug, Args)]
 pub(super) struct PublishArgs {
@@ -32,8 +33,8 @@ pub(super) struct PublishArgs {
     #[arg(long)]
     unverified: bool,
     /// Seconds to wait for the executor's admission.
-    #[arg(long, default_value_t = 5.0)]
-    timeout: f64,
+    #[arg(long, value_name = "S", default_value = "5", value_parser = seconds)]
+    timeout: Duration,
 }
 
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
@@ -46,7 +47,7 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     let join = args.join.map_or(natural, Join::from);
     // An end comes after the plans before it and may be slowed down: be generous.
     let end = args.wait.then(|| Duration::from_secs_f64(10.0 * plan.duration() + 600.0));
-    let patience = Patience { admission: Duration::from_secs_f64(args.timeout), end };
+    let patience = Patience { admission: args.timeout, end };
     publish(&plan, &args.robot_name, args.ipc_root.as_deref(), join, patience, &mut |event| {
         println!("{}", describe(event));
     })?;

@@ -12,6 +12,7 @@ use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
 
 use crate::exit::{OK, VIOLATIONS};
+use crate::numbers::seconds;
 use crate::plan::{PlanArgs, make};
 
 #[derive(Debug, Args)]
@@ -21,8 +22,8 @@ pub(super) struct ReplanArgs {
     running: PathBuf,
     /// How long planning may take: the new plan begins in the first knot that is further ahead.
     /// Where planning takes longer, the arm is stopped on its path and planned for from there. [s]
-    #[arg(long, value_name = "S", default_value_t = 10.0)]
-    lead: f64,
+    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds)]
+    lead: Duration,
     /// The robot's name in the service names.
     #[arg(long, default_value = DEFAULT_ROBOT)]
     robot_name: String,
@@ -33,8 +34,8 @@ pub(super) struct ReplanArgs {
     #[arg(long)]
     wait: bool,
     /// Seconds to wait for the executor's admission.
-    #[arg(long, default_value_t = 5.0)]
-    timeout: f64,
+    #[arg(long, value_name = "S", default_value = "5", value_parser = seconds)]
+    timeout: Duration,
     #[command(flatten)]
     plan: PlanArgs,
 }
@@ -45,16 +46,15 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
         "where the new plan begins and the robot stands is the running plan's: leave out \
          --continue, --start, --base, --torso and --held"
     );
-    let lead = Duration::try_from_secs_f64(args.lead)?;
     let running = Plan::read(&args.running)?;
     let end = args.wait.then(|| Duration::from_secs_f64(10.0 * running.duration() + 600.0));
-    let patience = Patience { admission: Duration::from_secs_f64(args.timeout), end };
+    let patience = Patience { admission: args.timeout, end };
     let site = Site { robot: &args.robot_name, root: args.ipc_root.as_deref() };
     let mut code = OK;
     let mut from = |start: Start| {
         let (knot, held) = match start {
             Start::Knot(knot) => {
-                println!("planning from knot {knot} on, at most {} s", args.lead);
+                println!("planning from knot {knot} on, at most {} s", args.lead.as_secs_f64());
                 (knot, None)
             }
             Start::Held { knot, at } => {
@@ -69,7 +69,7 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
         code = made;
         if code == VIOLATIONS { Err("it breaks a rule".to_owned()) } else { Ok(plan) }
     };
-    let done = replan(site, &running, lead, patience, &mut from, &mut |event| {
+    let done = replan(site, &running, args.lead, patience, &mut from, &mut |event| {
         println!("{}", describe(event));
     });
     match done {

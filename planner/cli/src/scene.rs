@@ -16,6 +16,7 @@ use nullsweep_surface::{
 
 use crate::advice;
 use crate::bars::Bars;
+use crate::numbers::{Numbers, finite, not_negative, positive};
 use crate::room::{self, ObjectChoice, TABLE_TOP};
 use crate::views;
 
@@ -32,10 +33,10 @@ pub(super) struct SceneArgs {
     #[arg(long)]
     as_placed: bool,
     /// Height of the sensor above what the object stands on. [m]
-    #[arg(long, value_name = "M", requires = "up")]
+    #[arg(long, value_name = "M", requires = "up", value_parser = finite)]
     sensor_height: Option<f64>,
     /// Height above the floor of what the object stands on; above 0 it becomes a table. [m]
-    #[arg(long, value_name = "M", default_value_t = 0.0)]
+    #[arg(long, value_name = "M", default_value_t = 0.0, value_parser = not_negative)]
     support_height: f64,
     /// Size of that table's top, along x and y of the floor frame, the object in its middle; without
     /// it the table is taken to reach 0.45 m beyond the object on every side. [m]
@@ -45,7 +46,7 @@ pub(super) struct SceneArgs {
     #[arg(long, value_enum, default_value = "avoid")]
     unseen: UnseenArg,
     /// Factor from the file's unit to metres: 0.001 for millimetres.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = positive)]
     scale: f64,
     /// Keep only this box of the floor frame as the surface to sweep, the rest stays an obstacle:
     /// xmin,ymin,zmin,xmax,ymax,zmax.
@@ -91,28 +92,6 @@ impl FromStr for TableSize {
             _ => Err(format!("`{text}` is no length in metres")),
         };
         Ok(Self([side(length)?, side(width)?]))
-    }
-}
-
-/// N comma-separated finite numbers.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
-
-impl<const N: usize> FromStr for Numbers<N> {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let values: Vec<f64> = text
-            .split(',')
-            .map(|part| part.trim().parse::<f64>().map_err(|e| format!("`{part}`: {e}")))
-            .collect::<Result<_, _>>()?;
-        let numbers: [f64; N] =
-            values.try_into().map_err(|v: Vec<f64>| format!("{} numbers, not {N}", v.len()))?;
-        if numbers.iter().all(|v| v.is_finite()) {
-            Ok(Self(numbers))
-        } else {
-            Err("the numbers must be finite".into())
-        }
     }
 }
 

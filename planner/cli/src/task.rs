@@ -13,6 +13,7 @@ use nullsweep_planner::task::{self, TaskConfig, TaskFigures, Tolerance};
 use crate::bars::Bars;
 use crate::exit::OK;
 use crate::json::write_json;
+use crate::numbers::velocity;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 
@@ -35,7 +36,7 @@ pub(super) struct TaskArgs {
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     floor: Option<f64>,
     /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
-    #[arg(long)]
+    #[arg(long, value_parser = velocity)]
     v_max: Option<f64>,
     /// Rounds of order and relaxation.
     #[arg(long, default_value_t = 4)]

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use nullsweep_planner::plan::Plan;
-use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
+use nullsweep_planner::plan::{Plan, PlanKnot, Profile};
+use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Tool};
 
 fn planner(folder: &Path, args: &str) -> (Option<i32>, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_planner"));
@@ -80,4 +80,78 @@ fn an_unknown_flag_is_wrong_usage() {
         assert!(said.contains("--help"), "{args}: {said}");
         assert!(!folder.path().join("plan.json").exists());
     }
+}
+
+#[test]
+fn a_number_that_makes_no_sense_is_wrong_usage() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for args in [
+        "plan --demo chair-seat --v-max 0",
+        "plan --demo chair-seat --v-max=-1",
+        "plan --demo chair-seat --v-max NaN",
+        "plan --demo chair-seat --v-max inf",
+        "plan --demo chair-seat --v-max 1e-300",
+        "plan --demo chair-seat --torso NaN",
+        "plan --demo chair-seat --start 0,nan,0",
+        "plan --demo chair-seat --held torso_lift_joint=inf",
+        "plan --demo chair-seat --base 0,0,inf",
+        "plan --demo chair-seat --patch-radius 0",
+        "plan --demo chair-seat --radius=-1",
+        "plan --demo chair-seat --beta NaN",
+        "plan scan.pcd --scale 0",
+        "plan scan.pcd --support-height NaN",
+        "task poses.csv --v-max 0",
+        "publish plan.json --timeout NaN",
+        "publish plan.json --timeout=-1",
+        "replan --running plan.json --demo chair-seat --lead 1e300",
+    ] {
+        let (code, said) = planner(folder.path(), args);
+        assert_eq!(code, Some(2), "{args}: {said}");
+        let flag = args.split([' ', '=']).rev().nth(1).expect("a flag");
+        assert!(said.contains(flag), "{args}: {said}");
+    }
+}
+
+/// Files that are no plan or no tool are told as that, at once, whoever reads them.
+#[test]
+fn a_plan_or_a_tool_that_cannot_be_fails_with_its_field() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    };
+    let robot = Robot::pr2();
+    let arm = robot.arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+    let mut plan = Plan::of(&robot, &arm, &Tool::default(), vec![knot(0), knot(1_000_000)]);
+    plan.joints = (0..9).map(|j| format!("joint_{j}")).collect();
+    write("nine.json", &serde_json::to_string(&plan).expect("numbers"));
+    plan.joints = Vec::new();
+    write("none.json", &serde_json::to_string(&plan).expect("numbers"));
+    plan.joints = arm.joint_names().to_vec();
+    plan.knots.swap(0, 1);
+    plan.profile = Profile::Acceleration;
+    write("falling.json", &serde_json::to_string(&plan).expect("numbers"));
+    let tool = toml::to_string(&Tool::default()).expect("a table");
+    write("thin.toml", &tool.replace("thickness = 0.03", "thickness = -0.03"));
+    write("wide.toml", &tool.replace("width = 0.07", "width = nan"));
+    write("turned.toml", &tool.replace("across = [0.0, 1.0, 0.0]", "across = [2.0, 0.0, 0.0]"));
+    write("poses.csv", "0.5,0,0.5,0,0,0,1");
+    let on = "plan --demo chair-seat --profile acceleration --continue";
+    for (args, says) in [
+        ("inspect nine.json".to_owned(), "9 joints: 1 to 8 are wanted"),
+        ("export nine.json --format csv".to_owned(), "9 joints: 1 to 8 are wanted"),
+        ("inspect none.json".to_owned(), "0 joints"),
+        (format!("{on} falling.json@0"), "knot 1: time 0 ns does not come after 1000000 ns"),
+        ("task poses.csv --tool thin.toml".to_owned(), "thickness is -0.03 m"),
+        ("plan --demo chair-seat --tool wide.toml".to_owned(), "width is NaN m"),
+        ("task poses.csv --tool turned.toml".to_owned(), "are parallel"),
+    ] {
+        let (code, said) = planner(folder.path(), &args);
+        assert_eq!(code, Some(1), "{args}: {said}");
+        assert!(said.contains(says), "{args}: {said}");
+    }
+}
+
+fn knot(time_ns: u64) -> PlanKnot {
+    let (q, v) = (JointVector::ZERO, JointVector::ZERO);
+    PlanKnot { time_ns, q, v, line: None, patch: None }
 }

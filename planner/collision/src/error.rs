@@ -1,5 +1,7 @@
 //! Why a check could not be built.
 
+use nullsweep_robot::ToolError;
+
 use crate::mesh::MeshError;
 use crate::srdf::SrdfError;
 
@@ -47,6 +49,9 @@ pub enum CollisionError {
         /// Its value. \[m\]
         value: f64,
     },
+    /// There cannot be such a tool.
+    #[error(transparent)]
+    Tool(#[from] ToolError),
     /// More driven joints than the check can hold.
     #[error("{count} joints are driven by the arm (with mimics), at most {most} are supported")]
     TooManyBodies {

@@ -55,6 +55,7 @@ impl Scene {
         options: &Options,
     ) -> Result<(Self, Bodies), CollisionError> {
         check_input(points, &options.margins)?;
+        tool.check()?;
         let bodies = Bodies::new(robot, arm)
             .map_err(|count| CollisionError::TooManyBodies { count, most: MAX_BODIES })?;
         let (parts, notes) = parts::collect(robot, arm, tool, options)?;

@@ -49,6 +49,9 @@ pub fn run(
     job: &Job,
     progress: &dyn Progress,
 ) -> Result<Outcome, PipelineError> {
+    if let Some(After { plan, .. }) = &job.after {
+        plan.check_bounds()?;
+    }
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);

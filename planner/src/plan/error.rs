@@ -48,6 +48,39 @@ pub enum PlanError {
         "the plan was changed after it was verified: robot, held joints, tool, place, surface or past"
     )]
     Changed,
+    /// A number is none, or greater than any joint's.
+    #[error("knot {knot}{of}: {value:e} is no place or velocity of a joint: plan it again")]
+    NotFinite {
+        /// Which knot.
+        knot: usize,
+        /// Of which path, in words.
+        of: &'static str,
+        /// What stands there.
+        value: f64,
+    },
+    /// Times do not rise, or go on for longer than the wire takes.
+    #[error("knot {knot}{of}: time {time_ns} ns does not come after {before} ns, or too late")]
+    TimeOrder {
+        /// Which knot.
+        knot: usize,
+        /// Of which path, in words.
+        of: &'static str,
+        /// Its time. \[ns\]
+        time_ns: u64,
+        /// The time of the knot before. \[ns\]
+        before: u64,
+    },
+    /// It would take for ever to go through it.
+    #[error(
+        "the plan, and what was followed before it, moves joints by {moved:.0} rad in all, at most \
+         {most} rad are gone through: plan it again"
+    )]
+    TooFar {
+        /// How far. \[rad\] or \[m\]
+        moved: f64,
+        /// The most. \[rad\] or \[m\]
+        most: f64,
+    },
     /// More knots than the wire takes.
     #[error("the plan has {found} knots, the wire takes {MAX_KNOTS}")]
     TooLong {

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use nullsweep_robot::{JointVector, MAX_DOF};
 use serde::Serialize;
 
 use super::file::Plan;
@@ -67,14 +68,14 @@ pub struct Point {
 /// The plan's motion.
 #[must_use]
 pub fn trajectory(plan: &Plan) -> JointTrajectory {
-    let dof = plan.joints.len();
+    let lanes = |q: &JointVector| q.iter().copied().take(plan.joints.len()).collect();
     let curved = plan.profile == Profile::Acceleration;
     let points = plan
         .knots
         .iter()
         .map(|k| Point {
-            positions: k.q[..dof].to_vec(),
-            velocities: if curved { k.v[..dof].to_vec() } else { Vec::new() },
+            positions: lanes(&k.q),
+            velocities: if curved { lanes(&k.v) } else { Vec::new() },
             accelerations: Vec::new(),
             effort: Vec::new(),
             time_from_start: Time {
@@ -121,9 +122,10 @@ fn csv(plan: &Plan, out: &mut impl Write) -> io::Result<()> {
     let speeds: Vec<String> = plan.joints.iter().map(|j| format!("{j}_velocity")).collect();
     writeln!(out, "time_from_start,{names},{},patch,contact", speeds.join(","))?;
     let points = trajectory(plan).points;
+    let dof = plan.joints.len().min(MAX_DOF);
     for (k, (knot, point)) in plan.knots.iter().zip(&points).enumerate() {
         let Time { secs, nsecs } = point.time_from_start;
-        let velocities = list(&knot.v[..plan.joints.len()]).replace(", ", ",");
+        let velocities = list(&knot.v[..dof]).replace(", ", ",");
         writeln!(
             out,
             "{secs}.{nsecs:09},{},{velocities},{},{}",

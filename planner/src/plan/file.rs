@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use nullsweep_robot::{Arm, Robot, Tool};
-use serde::{Deserialize, Serialize};
+use nullsweep_robot::{Arm, MAX_DOF, Robot, Tool};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::curve::Curve;
 use super::error::{FORMAT, PlanError};
@@ -24,7 +25,8 @@ pub struct Plan {
     /// Fingerprint of robot and arm. Hexadecimal in the file: JSON numbers lose 64 bits.
     #[serde(with = "hex")]
     pub fingerprint: u64,
-    /// The arm's joints, base to tip.
+    /// The arm's joints, base to tip; in a file 1 to [`MAX_DOF`].
+    #[serde(deserialize_with = "joints")]
     pub joints: Vec<String>,
     /// The joints that the plan takes as fixed, in the URDF's order. \[rad\] or \[m\]
     pub held: Vec<Held>,
@@ -153,7 +155,15 @@ impl Plan {
     pub fn read(path: &Path) -> Result<Self, PlanError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| PlanError::File { path: path.into(), source })?;
-        let plan: Self = serde_json::from_str(&text)
+        Self::parse(&text, path)
+    }
+
+    /// Reads a plan from the text of its file; `path` is only used to name it in errors.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, PlanError> {
+        let plan: Self = serde_json::from_str(text)
             .map_err(|source| PlanError::Parse { path: path.into(), source })?;
         if plan.format == FORMAT {
             Ok(plan)
@@ -235,6 +245,16 @@ impl Plan {
         let knots = self.knots[..self.knots.len().min(knot + 1)].to_vec();
         let last = Stretch { tool: self.tool.clone(), profile: self.profile, knots };
         self.past.iter().cloned().chain([last]).collect()
+    }
+}
+
+/// As many names as a joint vector has lanes, or fewer.
+fn joints<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<String>, D::Error> {
+    let names = Vec::<String>::deserialize(input)?;
+    if (1..=MAX_DOF).contains(&names.len()) {
+        Ok(names)
+    } else {
+        Err(D::Error::custom(format!("{} joints: 1 to {MAX_DOF} are wanted", names.len())))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The plan: what the planner makes, stores and hands on.
 
+mod bounds;
 mod curve;
 mod error;
 pub mod export;

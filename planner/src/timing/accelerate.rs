@@ -38,9 +38,11 @@ pub struct Rest {
 
 impl Rest {
     /// Brakes on the plan's path from its knot on. While the plan itself leaves no reserve for
-    /// braking, it is followed exactly. `None` if the plan has no such knot.
+    /// braking, it is followed exactly. `None` if the plan has no such knot, or cannot be gone
+    /// through ([`Plan::check_bounds`]).
     #[must_use]
     pub fn after(plan: &Plan, knot: usize, limits: &Limits) -> Option<Self> {
+        plan.check_bounds().ok()?;
         let knots = plan.knots.get(knot..)?;
         let first = knots.first()?;
         let stands = |k: &PlanKnot| k.v == JointVector::default();
@@ -74,7 +76,8 @@ impl Rest {
     pub fn then(&self, plan: Plan) -> Plan {
         let start = self.knots.last().map_or(0, |k| k.time_ns);
         let rest = plan.knots.iter().skip(1);
-        let later = rest.map(|k| PlanKnot { time_ns: k.time_ns + start, ..*k });
+        let late = |k: &PlanKnot| k.time_ns.saturating_add(start);
+        let later = rest.map(|k| PlanKnot { time_ns: late(k), ..*k });
         let knots = self.knots.iter().copied().chain(later).collect();
         Plan { knots, ..plan }
     }
@@ -190,5 +193,38 @@ impl Judge<'_> {
             })
         };
         free(ToolContact::Forbidden) || (lifts() && free(ToolContact::Allowed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
+
+    use super::*;
+
+    /// A plan whose times fall, or go on for ever, leads to no rest, wherever one asks.
+    #[test]
+    fn no_rest_after_times_that_do_not_rise() {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+        let moving = |time_ns, q: f64, v: f64| PlanKnot {
+            time_ns,
+            q: JointVector::from_fn(|j| if j < 7 { q } else { 0.0 }),
+            v: JointVector::from_fn(|j| if j < 7 { v } else { 0.0 }),
+            line: None,
+            patch: None,
+        };
+        let rest = |times: [u64; 3]| {
+            let [a, b, c] = times;
+            let knots = vec![moving(a, 0.0, 0.1), moving(b, 0.1, 0.1), moving(c, 0.15, 0.0)];
+            let plan = Plan::of(&robot, &arm, &Tool::default(), knots);
+            let plan = Plan { profile: Profile::Acceleration, ..plan };
+            (0..4).map(|k| Rest::after(&plan, k, &Limits::of(&arm, None))).collect::<Vec<_>>()
+        };
+        let sound = rest([0, 1_000_000_000, 2_000_000_000]);
+        assert!(sound[..3].iter().all(Option::is_some) && sound[3].is_none());
+        for times in [[9, 5, 1], [0, 2, 2], [u64::MAX, 0, 5], [0, 5, u64::MAX]] {
+            assert_eq!(rest(times), [None, None, None, None], "{times:?}");
+        }
     }
 }

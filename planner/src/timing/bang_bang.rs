@@ -16,7 +16,7 @@ pub fn bang_bang(path: &[JointVector], velocity: &JointVector) -> Vec<u64> {
     let mut now = 0u64;
     for (i, q) in path.iter().enumerate() {
         if i > 0 {
-            now += segment_ns(&path[i - 1], q, velocity);
+            now = now.saturating_add(segment_ns(&path[i - 1], q, velocity));
         }
         times.push(now);
     }

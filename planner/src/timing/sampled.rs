@@ -160,7 +160,7 @@ fn place(cells: &[Cell], x: &[f64], from_ns: u64) -> (Vec<Timed>, Vec<usize>) {
             let s = speed * late + 0.5 * u * late * late;
             let rate = speed + u * late;
             let knot = Timed {
-                time_ns: from_ns + time_ns as u64,
+                time_ns: from_ns.saturating_add(time_ns as u64),
                 q: if i == 0 { piece.start } else { piece.at(s) },
                 v: JointVector::new(piece.slope_at(s).map(|slope| slope * rate)),
                 source: piece.source[0],
@@ -171,7 +171,7 @@ fn place(cells: &[Cell], x: &[f64], from_ns: u64) -> (Vec<Timed>, Vec<usize>) {
     }
     if let Some(Cell { piece, .. }) = cells.last() {
         let end = Timed {
-            time_ns: from_ns + (time * 1e9).ceil() as u64,
+            time_ns: from_ns.saturating_add((time * 1e9).ceil() as u64),
             q: piece.at(piece.length),
             v: JointVector::ZERO,
             source: piece.source[1],
@@ -195,7 +195,8 @@ fn goes_on(a: &Cell, b: &Cell, before: f64, after: f64, x: f64) -> bool {
 
 /// By how much the cubic between two knots exceeds the limits: a factor on speed.
 fn excess(a: &Timed, b: &Timed, limits: &Limits) -> f64 {
-    let curve = Curve::cubic((&a.q, &a.v), (&b.q, &b.v), (b.time_ns - a.time_ns) as f64 * 1e-9);
+    let curve =
+        Curve::cubic((&a.q, &a.v), (&b.q, &b.v), b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9);
     let mut most = 0.0f64;
     for j in 0..MAX_DOF {
         if limits.velocity[j] > 0.0 {

@@ -111,7 +111,7 @@ pub enum VerifyError {
         /// The arm's fingerprint.
         arm: u64,
     },
-    /// The plan cannot be sent to any executor.
+    /// The plan cannot be sent to any executor, or gone through.
     #[error(transparent)]
     Plan(#[from] PlanError),
     /// The plan is of another scan.
@@ -165,7 +165,10 @@ pub fn verify(
     }
     let mut violations = kinematics(plan, &arm);
     let is_finite = !violations.iter().any(|v| v.kind == ViolationKind::NotFinite);
-    if !is_finite || plan.knots.len() < 2 {
+    let bounded = plan.check_bounds();
+    if violations.is_empty() {
+        bounded?;
+    } else if !is_finite || bounded.is_err() || plan.knots.len() < 2 {
         violations.sort_by_key(|v| v.knot);
         return Ok(Verification { violations, ..Verification::default() });
     }

@@ -1,12 +1,15 @@
 //! Times, limits and rest.
 
+use nullsweep_ipc_types::Knot;
 use nullsweep_robot::{Arm, JointVector};
 
 use super::violation::{Violation, ViolationKind};
-use crate::plan::{Curve, Plan, Profile};
+use crate::plan::{Curve, Plan, PlanKnot, Profile};
 
-/// Time between two samples of a plan with limited acceleration. \[s\]
-const SAMPLE: f64 = 1e-3;
+/// Time between two samples of a plan with limited acceleration. \[ns\]
+const SAMPLE_NS: u64 = 1_000_000;
+/// The same. \[s\]
+const SAMPLE: f64 = SAMPLE_NS as f64 * 1e-9;
 /// What an acceleration may exceed its limit by, as a share of it.
 const ROUNDING: f64 = 1e-6;
 
@@ -23,7 +26,7 @@ pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
         }
         let before = k.checked_sub(1).map(|b| &plan.knots[b]);
         let rises = before.map_or(knot.time_ns == 0, |b| knot.time_ns > b.time_ns);
-        if !rises {
+        if !rises || knot.time_ns > Knot::LATEST_NS {
             report(k, ViolationKind::TimeOrder, format!("time {} ns", knot.time_ns));
             continue;
         }
@@ -44,6 +47,8 @@ pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
                 }
             }
             let (low, high) = arm.braking_limits(j, velocity);
+            // Joints that turn without end are bounded too: no executor takes them further.
+            let (low, high) = (low.max(-Knot::FARTHEST), high.min(Knot::FARTHEST));
             let (lowest, highest) = curve.range(j);
             if !(lowest >= low && highest <= high) {
                 let detail =
@@ -60,51 +65,51 @@ pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
                 report(k, ViolationKind::Acceleration, format!("not at rest: {:?}", knot.v));
             }
         }
-        found.extend(sampled(plan, arm));
+        // Samples ask for times that rise.
+        if !found.iter().any(|v| v.kind == ViolationKind::TimeOrder) {
+            found.extend(sampled(plan, arm));
+        }
     }
     found
 }
 
 /// Velocity and acceleration of the positions that a controller gets every [`SAMPLE`], by
 /// differences: what bounds on each curve by itself do not see is a step where two curves meet.
+/// Only samples around a knot are looked at, so that a long plan takes no longer.
 fn sampled(plan: &Plan, arm: &Arm) -> Vec<Violation> {
     let mut found = Vec::new();
-    let mut last: Vec<JointVector> = Vec::new();
-    let mut k = 1;
     let end_ns = plan.knots.last().map_or(0, |k| k.time_ns);
-    for time_ns in (0..=end_ns).step_by((SAMPLE * 1e9) as usize) {
-        while k + 1 < plan.knots.len() && plan.knots[k].time_ns < time_ns {
-            k += 1;
-        }
-        let Some(from) = plan.knots.get(k - 1).filter(|_| k < plan.knots.len()) else { break };
-        let curve = plan.curve(k);
-        let now = curve.at(time_ns.saturating_sub(from.time_ns) as f64 * 1e-9 / curve.seconds());
-        if let [.., two, one] = last[..] {
-            for (j, name) in arm.joint_names().iter().enumerate() {
-                let limits = &arm.limits()[j];
-                let velocity = (now[j] - one[j]) / SAMPLE;
-                let acceleration = (now[j] - 2.0 * one[j] + two[j]) / (SAMPLE * SAMPLE);
-                let fast = velocity.abs() > limits.velocity * (1.0 + 1e-9);
-                let hard = acceleration.abs() > limits.acceleration * (1.0 + ROUNDING);
-                if fast || hard {
-                    found.push(Violation {
-                        knot: k,
-                        kind: if hard {
-                            ViolationKind::Acceleration
-                        } else {
-                            ViolationKind::Velocity
-                        },
-                        detail: format!(
-                            "{name} at {time_ns} ns: sampled {velocity:.4}, {acceleration:.4}"
-                        ),
-                    });
-                }
+    let after = |knot: &PlanKnot| [1, 2].map(|more| knot.time_ns / SAMPLE_NS + more);
+    let mut samples: Vec<u64> = plan.knots.iter().flat_map(after).collect();
+    samples.retain(|&s| s >= 2 && s <= end_ns / SAMPLE_NS);
+    samples.sort_unstable();
+    samples.dedup();
+    for sample in samples {
+        let [two, one, now] = [2, 1, 0].map(|back| at(plan, (sample - back) * SAMPLE_NS));
+        let ((_, two), (_, one), (knot, now)) = (two, one, now);
+        for (j, name) in arm.joint_names().iter().enumerate() {
+            let limits = &arm.limits()[j];
+            let velocity = (now[j] - one[j]) / SAMPLE;
+            let acceleration = (now[j] - 2.0 * one[j] + two[j]) / (SAMPLE * SAMPLE);
+            let fast = velocity.abs() > limits.velocity * (1.0 + 1e-9);
+            let hard = acceleration.abs() > limits.acceleration * (1.0 + ROUNDING);
+            if fast || hard {
+                let kind = if hard { ViolationKind::Acceleration } else { ViolationKind::Velocity };
+                let time_ns = sample * SAMPLE_NS;
+                let detail =
+                    format!("{name} at {time_ns} ns: sampled {velocity:.4}, {acceleration:.4}");
+                found.push(Violation { knot, kind, detail });
             }
-        }
-        last.push(now);
-        if last.len() > 2 {
-            last.remove(0);
         }
     }
     found
+}
+
+/// The knot in which the segment of a time ends, and where the joints are then. The times rise, and
+/// the last is not earlier.
+fn at(plan: &Plan, time_ns: u64) -> (usize, JointVector) {
+    let knot = plan.knots.partition_point(|k| k.time_ns < time_ns).max(1);
+    let curve = plan.curve(knot);
+    let since = time_ns.saturating_sub(plan.knots[knot - 1].time_ns) as f64 * 1e-9;
+    (knot, curve.at(since / curve.seconds()))
 }

@@ -8,9 +8,10 @@ mod pad;
 mod stage;
 
 use case::Case;
-use nullsweep_planner::plan::{Continues, Plan, PlanKnot, Profile};
-use nullsweep_planner::verify::ViolationKind;
-use stage::{detour, joint, judge, on_the_line, posture, retimed, spoilt, stage, stretched};
+use nullsweep_ipc_types::Knot;
+use nullsweep_planner::plan::{Continues, Plan, PlanError, PlanKnot, Profile};
+use nullsweep_planner::verify::{VerifyError, ViolationKind};
+use stage::{detour, joint, judge, look, on_the_line, posture, retimed, spoilt, stage, stretched};
 
 /// Ways to break each rule. A new kind does not compile without its own.
 fn cases(kind: ViolationKind) -> Vec<Case> {
@@ -96,7 +97,15 @@ fn times() -> Vec<Case> {
         plan.knots.truncate(count);
         plan
     };
+    let endless =
+        |plan: &Plan| spoilt(plan, |knots| knots.last_mut().expect("knots").time_ns = u64::MAX);
     vec![
+        case("an end in 584 years", endless(&s.bang), s.bang.knots.len() - 1),
+        case(
+            "an end in 584 years, accelerations limited",
+            endless(&s.smooth),
+            s.smooth.knots.len() - 1,
+        ),
         Case::new("no knot", shortened(0), 0, "0 knots"),
         Case::new("one knot", shortened(1), 0, "1 knots"),
         case("a time before the last one", back, k),
@@ -233,6 +242,17 @@ fn slow(beyond: f64) -> Plan {
     stretched(&from_the_edge(beyond), 1, 20.0)
 }
 
+/// What was followed before is not refused for its limits, but it has to end.
+#[test]
+fn a_past_without_an_end_is_refused() {
+    let s = stage();
+    let mut plan = Plan { past: s.bang.followed(s.bang.knots.len()), ..s.bang.clone() };
+    assert_eq!(judge(&plan, &s.scene).violations, []);
+    plan.past[0].knots[on_the_line(&s.bang)].q[joint("r_wrist_roll_joint")] = 1e12;
+    let found = look(&plan, &s.scene).map(|v| v.violations);
+    assert!(matches!(found, Err(VerifyError::Plan(PlanError::TooFar { .. }))), "{found:?}");
+}
+
 /// The elbow swings past its upper end between two knots where it has room to brake.
 fn bow() -> Plan {
     let name = "r_elbow_flex_joint";
@@ -252,7 +272,14 @@ fn limits() -> Vec<Case> {
     };
     let case =
         |what, name: &str, upper| Case::new(what, beyond(name, upper), 1, format!("{name}: "));
+    let roll = "r_wrist_roll_joint";
+    let turned = |time_ns, to| alone(roll, &[(0, 0.0, 0.0), (time_ns, to, 0.0)]);
     vec![
+        Case::new("160 turns and more", turned(3_000_000_000_000, -1001.0), 1, format!("{roll}: ")),
+        Case {
+            also: &[ViolationKind::Velocity],
+            ..Case::new("1e12 rad", turned(Knot::LATEST_NS, 1e12), 1, format!("{roll}: "))
+        },
         case("the wrist past its upper end", "r_wrist_flex_joint", true),
         case("the shoulder past its lower end", "r_shoulder_lift_joint", false),
         Case::new("too fast so near to an end", from_the_edge(-0.01), 1, "r_wrist_flex_joint: "),

@@ -9,7 +9,7 @@ use nullsweep_planner::pipeline::{Job, StanceChoice, run};
 use nullsweep_planner::plan::{Plan, PlanKnot};
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::timing::{Limits, accelerate, bang_bang};
-use nullsweep_planner::verify::{Given, Verification, verify};
+use nullsweep_planner::verify::{Given, Verification, VerifyError, verify};
 use nullsweep_planner::workcell::{Scene, Stance, Workcell};
 use nullsweep_robot::{Arm, ArmSpec, Geometry, JointVector, Robot, Side, Tool};
 
@@ -77,9 +77,13 @@ pub(crate) fn scene_with(name: &str, half_extents: Vector3<f64>, centre: Vector3
 }
 
 pub(crate) fn judge(plan: &Plan, scene: &Scene) -> Verification {
+    look(plan, scene).expect("it can be checked")
+}
+
+pub(crate) fn look(plan: &Plan, scene: &Scene) -> Result<Verification, VerifyError> {
     let (robot, arm) = (&Robot::pr2(), &ArmSpec::pr2(Side::Right));
     let given = Given { robot, arm, scene, collision: &Options::default() };
-    verify(plan, given, &|| ()).expect("it can be checked")
+    verify(plan, given, &|| ())
 }
 
 pub(crate) fn spoilt(plan: &Plan, spoil: impl FnOnce(&mut [PlanKnot])) -> Plan {

@@ -55,6 +55,19 @@ pub(crate) const CRATES: &[Crate] = &[
     ),
     with("executor", &["ipc-types", "robot"]),
     Crate { dir: "tests", may: May::ImportAll, dev: &[] },
+    with(
+        "tests/inputs",
+        &[
+            "planner",
+            "planner/gtsp",
+            "planner/surface",
+            "planner/collision",
+            "executor",
+            "robot",
+            "ipc-types",
+        ],
+    ),
+    with("fuzz", &["tests/inputs"]),
     with("pr2-bridge", &["ipc-types", "robot", "executor"]),
 ];
 
@@ -129,6 +142,7 @@ pub(crate) const APART: &[(&str, &str, &[&str])] = &[
 pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("parry3d-f64", &["planner/collision"]),
     ("clap", &["planner/cli", "executor", "tests", "pr2-bridge"]),
+    ("ratatui", &["executor/src/top"]),
     ("indicatif", &["planner/cli"]),
     ("plotly", &["planner/report", "tests"]),
     ("plotters", &["planner/experiment"]),

@@ -11,7 +11,7 @@ pub(crate) fn check(tree: &Tree, table: &[(&str, &[&str])]) -> Vec<Offence> {
     for package in &packages {
         for dependency in &package.dependencies {
             if let Some((name, rooms)) = table.iter().find(|(name, _)| *name == dependency.name)
-                && !allows(rooms, package)
+                && !rooms.iter().any(|room| is_in(room, package, &packages))
             {
                 let text = format!("{name} belongs to {}", rooms.join(", "));
                 offences.push(Offence::new(&package.manifest_path(), dependency.line, text));
@@ -22,7 +22,7 @@ pub(crate) fn check(tree: &Tree, table: &[(&str, &[&str])]) -> Vec<Offence> {
         let Some(package) = package_of(&packages, path) else { continue };
         let barred: Vec<(String, &[&str])> = table
             .iter()
-            .filter(|(_, rooms)| !allows(rooms, package))
+            .filter(|(_, rooms)| !rooms.iter().any(|room| is_of(path, room, package)))
             .map(|&(name, rooms)| (name.replace('-', "_"), rooms))
             .collect();
         for named in paths(tokens(path, text)) {
@@ -38,9 +38,14 @@ pub(crate) fn check(tree: &Tree, table: &[(&str, &[&str])]) -> Vec<Offence> {
     offences
 }
 
-/// A room is one crate; a crate in a folder inside it is another room.
-fn allows(rooms: &[&str], package: &Package) -> bool {
-    rooms.contains(&package.dir.as_str())
+/// A room is one crate, or a folder of its sources; a crate in a folder inside it is another room.
+fn is_in(room: &str, package: &Package, packages: &[Package]) -> bool {
+    package_of(packages, &format!("{room}/")).is_some_and(|owner| owner.dir == package.dir)
+}
+
+/// Whether a source of a package is of a room.
+fn is_of(path: &str, room: &str, package: &Package) -> bool {
+    room == package.dir || path.starts_with(&format!("{room}/"))
 }
 
 #[cfg(test)]
@@ -61,6 +66,21 @@ mod tests {
     #[test]
     fn a_library_in_its_room_passes() {
         assert!(told("/// clap::Parser\nfn f(clap: u8) { g(clap) }", "serde = \"1\"").is_empty());
+    }
+
+    #[test]
+    fn a_folder_of_sources_is_a_room() {
+        let tree = Tree::of(&[
+            ("x/Cargo.toml", "[package]\nname = \"x\"\n[dependencies]\nclap = \"4\"\n"),
+            ("x/src/lib.rs", "mod top; use clap::Args;"),
+            ("x/src/top/mod.rs", "use clap::Parser;"),
+            ("x/src/topmost.rs", "use clap::Parser;"),
+        ]);
+        let offences = check(&tree, &[("clap", &["x/src/top"])]);
+        let told: Vec<String> = offences.iter().map(ToString::to_string).collect();
+        let [lib, topmost] =
+            ["lib", "topmost"].map(|file| format!("x/src/{file}.rs:1: clap belongs to x/src/top"));
+        assert_eq!(told, [lib, topmost]);
     }
 
     #[test]

@@ -51,12 +51,13 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         surface: vec![sample(0.0, true), sample(5.0, false)],
         continues: None,
         past: Vec::new(),
+        seal: None,
     }
 }
 
 fn write(stage: &Stage, name: &str, plan: &Plan) -> PathBuf {
     let path = stage.file(name);
-    plan.write(&path).expect("a plan file");
+    plan.clone().sealed().write(&path).expect("a plan file");
     path
 }
 

@@ -124,3 +124,26 @@ fn an_obstacle_may_have_any_shape_that_a_urdf_has() {
     let error = Exact::new(&robot, &arm, &tool, &[], &[missing], &options).unwrap_err();
     assert!(matches!(error, CollisionError::ObstacleMesh { obstacle, .. } if obstacle == "gone"));
 }
+
+#[test]
+fn a_tool_that_cannot_be_is_refused_by_both_checks() {
+    let (robot, arm, tool) = pr2();
+    type Spoil = fn(&mut Tool);
+    let spoil: [(&str, Spoil); 4] = [
+        ("thickness is -0.03 m", |t| t.thickness = -0.03),
+        ("width is NaN m", |t| t.width = f64::NAN),
+        ("approach is [0.0, 0.0, 0.0]", |t| t.approach = [0.0; 3]),
+        ("are parallel", |t| t.across = t.approach),
+    ];
+    for (says, spoil) in spoil {
+        let mut tool = tool.clone();
+        spoil(&mut tool);
+        let options = Options::default();
+        let world = World::new(&robot, &arm, &tool, &[], &[], &options).map(|_| ());
+        let exact = Exact::new(&robot, &arm, &tool, &[], &[], &options).map(|_| ());
+        for refused in [world, exact] {
+            let said = refused.expect_err(says).to_string();
+            assert!(said.contains(says), "{said}");
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Numbers on the command line: what is no sensible one is wrong usage, not a failure later on.
+
+use std::str::FromStr;
+use std::time::Duration;
+
+/// Any finite number.
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    within(text, f64::is_finite, "a finite number is wanted")
+}
+
+/// A finite number above 0.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    within(text, |v| v.is_finite() && v > 0.0, "a number above 0 is wanted")
+}
+
+/// A finite number of at least 0.
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    within(text, |v| v.is_finite() && v >= 0.0, "a number of at least 0 is wanted")
+}
+
+/// A velocity. \[rad/s\] or \[m/s\]
+pub(super) fn velocity(text: &str) -> Result<f64, String> {
+    within(text, |v| (1e-3..=1e3).contains(&v), "0.001 to 1000 rad/s is wanted")
+}
+
+/// How long something may take, in seconds: up to a year.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    const YEAR: f64 = 366.0 * 86_400.0;
+    let value = within(text, |v| (0.0..=YEAR).contains(&v), "0 s to a year is wanted")?;
+    Ok(Duration::from_secs_f64(value))
+}
+
+fn within(text: &str, is_in: impl Fn(f64) -> bool, wanted: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|e| format!("{e}: {wanted}"))?;
+    if is_in(value) { Ok(value) } else { Err(wanted.into()) }
+}
+
+/// N comma-separated finite numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
+
+impl<const N: usize> FromStr for Numbers<N> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let values: Vec<f64> = text
+            .split(',')
+            .map(|part| finite(part.trim()).map_err(|e| format!("`{part}`: {e}")))
+            .collect::<Result<_, _>>()?;
+        let numbers = values.try_into();
+        numbers.map(Self).map_err(|v: Vec<f64>| format!("{} numbers, not {N}", v.len()))
+    }
+}

@@ -1,0 +1,18 @@
+//! A tool's file.
+
+use nullsweep_robot::Tool;
+
+pub(crate) fn run(bytes: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(bytes) else { return false };
+    let Ok(tool) = toml::from_str::<Tool>(text) else { return false };
+    let contact = tool.contact_in_tip();
+    assert!(contact.translation.vector.iter().all(|x| x.is_finite()), "{tool:?}");
+    assert!((contact.rotation.quaternion().norm() - 1.0).abs() < 1e-9, "{tool:?}");
+    let again = toml::to_string(&tool).expect("a tool is a table");
+    assert_eq!(toml::from_str::<Tool>(&again).expect("what was written"), tool);
+    true
+}
+
+pub(crate) fn made() -> Vec<Vec<u8>> {
+    vec![toml::to_string(&Tool::default()).expect("a tool is a table").into_bytes()]
+}
