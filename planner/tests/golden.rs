@@ -97,12 +97,12 @@ fn the_seat_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0x0340_eaa2_38f9_2947),
-                ("tsp acceleration", 0x1955_d49a_a8af_b0e3),
-                ("curvature velocity", 0xfb92_3e0f_1bc9_81c5),
-                ("curvature acceleration", 0x16b2_41f7_76d3_fdac),
-                ("joint velocity", 0x62f2_707d_63b1_acd4),
-                ("joint acceleration", 0x99d8_8c8c_aab2_d085),
+                ("tsp velocity", 0x27d1_7134_d1e3_7658),
+                ("tsp acceleration", 0xf780_8e88_a529_2362),
+                ("curvature velocity", 0xcbba_bf6b_8ea9_7055),
+                ("curvature acceleration", 0xe141_6e15_daf1_73ed),
+                ("joint velocity", 0x9e47_c81d_6e81_964f),
+                ("joint acceleration", 0x0c26_619c_1fb6_d1a8),
             ],
         );
     }
@@ -116,12 +116,12 @@ fn the_chair_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0xb74d_e103_b01b_94db),
-                ("tsp acceleration", 0x6671_a5e8_2636_1a6f),
-                ("curvature velocity", 0x0cc2_6750_e4e2_9760),
-                ("curvature acceleration", 0x75d7_7a1f_51eb_7639),
-                ("joint velocity", 0xf991_6470_d2ff_a278),
-                ("joint acceleration", 0xa061_3ce0_1bea_1026),
+                ("tsp velocity", 0xc633_4ffc_3732_72bc),
+                ("tsp acceleration", 0xb9b1_b057_b352_db73),
+                ("curvature velocity", 0x5b4f_5448_b15e_c965),
+                ("curvature acceleration", 0x1ba8_56cc_e931_1dde),
+                ("joint velocity", 0xdab8_e465_b3a0_4a4a),
+                ("joint acceleration", 0xf8b5_c7ca_0805_f8bd),
             ],
         );
     }
@@ -135,12 +135,12 @@ fn the_car_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0x9fed_a023_7e2f_0b3d),
-                ("tsp acceleration", 0x25bb_7b48_98cd_9682),
-                ("curvature velocity", 0xa078_84f2_69b7_dcde),
-                ("curvature acceleration", 0x62f0_6eb9_cc2c_f76e),
-                ("joint velocity", 0x5be7_c971_4bba_a573),
-                ("joint acceleration", 0xab4a_ff9e_bc55_9898),
+                ("tsp velocity", 0x5d13_6fa7_bf94_3399),
+                ("tsp acceleration", 0x0503_10ea_09ae_479b),
+                ("curvature velocity", 0xbd2d_09ce_636a_88f9),
+                ("curvature acceleration", 0x1dfc_e4f4_669b_761c),
+                ("joint velocity", 0x3f00_92f0_64ad_919b),
+                ("joint acceleration", 0xeafa_e521_4b4d_fafd),
             ],
         );
     }
@@ -170,7 +170,7 @@ fn a_stance_is_chosen_as_ever() {
         let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
         assert_golden(
             &[("left arm".into(), outcome.plan.digest().expect("short enough"))],
-            &[("left arm", 0x270f_71bc_5ae0_8749)],
+            &[("left arm", 0xddc0_0ffd_b1df_1667)],
         );
     }
 }
@@ -195,7 +195,7 @@ fn given_poses_are_planned_as_ever() {
     let outcome = task::run(&Robot::pr2(), &common::dome(), &config, &Silent).expect("a plan");
     assert_golden(
         &[("dome".into(), outcome.plan.digest().expect("short enough"))],
-        &[("dome", 0x7fc8_8066_5140_c240)],
+        &[("dome", 0xc302_bdc1_5fdc_ac9a)],
     );
 }
 
@@ -225,7 +225,7 @@ fn another_arm_is_planned_as_ever() {
         let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
         assert_golden(
             &[("panda".into(), outcome.plan.digest().expect("short enough"))],
-            &[("panda", 0xb4ae_4035_c795_bb0a)],
+            &[("panda", 0xc080_6d2c_c5c5_1df0)],
         );
     }
 }
