@@ -222,7 +222,8 @@ fn opened(signs: &Signs, wanted: u32, over: &dyn Fn() -> bool) -> bool {
     signs.open.load(Ordering::Acquire) >= wanted
 }
 
-/// Waits for the loop's end, and asks for it where another thread has ended. Whether it comes in time.
+/// Waits for the loop's end, and asks for it where another thread has ended. Whether it comes in
+/// time.
 fn watch(
     signs: &Signs,
     alarm: &Alarm,
