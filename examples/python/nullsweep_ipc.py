@@ -30,8 +30,8 @@ def refuse_empty(prefix):
         if not empty:
             return
         if time.monotonic() > end:
-            sys.exit(f"{empty[0]} is empty: a process died while it made it, or another user wrote to "
-                     "it; remove it and try again: no process that runs needs it")
+            sys.exit(f"{empty[0]} is empty: a process died while it made it, or another user wrote "
+                     "to it; remove it and try again: no process that runs needs it")
         time.sleep(0.025)
 
 

@@ -21,8 +21,8 @@ pub struct Alarm {
 
 impl Alarm {
     /// One that signals ring from now on: SIGUSR1 stops as `ctl stop` does, SIGUSR2 as `ctl stop
-    /// --disable`, SIGTERM, SIGINT and SIGHUP stop and end the program; the second one of these ends
-    /// it at once.
+    /// --disable`, SIGTERM, SIGINT and SIGHUP stop and end the program; the second one of these
+    /// ends it at once.
     ///
     /// # Errors
     /// When the system refuses a handler.

@@ -1,8 +1,8 @@
 //! `executor ctl`: an operator's commands.
 //!
 //! A stop goes to the process as a signal, before all else: whatever is wrong with shared memory or
-//! with the other clients, the arm stops. Then it is asked as every other command is, to tell how it
-//! was taken; that takes a bounded time.
+//! with the other clients, the arm stops. Then it is asked as every other command is, to tell how
+//! it was taken; that takes a bounded time.
 
 use std::io::Write;
 use std::path::Path;

@@ -34,7 +34,9 @@ const SHUTDOWN_WITHIN: Duration = Duration::from_secs(5);
 /// How long opening the ports may take, whatever is in the way.
 const OPEN_WITHIN: Duration = Duration::from_secs(15);
 /// How long the threads may take to end.
-const LEAVE_WITHIN: Duration = Duration::from_secs(2);
+const LEAVE_WITHIN: Duration = Duration::from_secs(10);
+/// The same where they still open their ports.
+const LEAVE_UNOPENED_WITHIN: Duration = Duration::from_millis(200);
 
 /// How an executor runs.
 #[derive(Clone, Debug)]
@@ -207,7 +209,7 @@ fn unopened(
     helpers: [Running<()>; 2],
 ) -> Result<Summary, ExecutorError> {
     // Nothing moves yet: what still opens its ports need not be waited for.
-    match end(signs, looping, helpers, LEAVE_WITHIN / 10) {
+    match end(signs, looping, helpers, LEAVE_UNOPENED_WITHIN) {
         Err(ExecutorError::Hangs { .. }) if alarm.is_shutting_down() => Ok(Summary::default()),
         result => result,
     }
@@ -222,7 +224,8 @@ fn opened(signs: &Signs, wanted: u32, over: &dyn Fn() -> bool) -> bool {
     signs.open.load(Ordering::Acquire) >= wanted
 }
 
-/// Waits for the loop's end, and asks for it where another thread has ended. Whether it comes in time.
+/// Waits for the loop's end, and asks for it where another thread has ended. Whether it comes in
+/// time.
 fn watch(
     signs: &Signs,
     alarm: &Alarm,
@@ -269,9 +272,12 @@ fn end(
     }
     let summary = looping.map_or(Ok(Summary::default()), |looping| joined("loop", looping));
     let [worker, service] = helpers;
-    joined("service", service)?;
-    joined("worker", worker)?;
-    summary
+    let mut wrong = Vec::from_iter(joined("service", service).err());
+    wrong.extend(joined("worker", worker).err());
+    let summary = summary.map_err(|e| wrong.push(e)).unwrap_or_default();
+    // What kept a thread from its work says more than that another one hangs.
+    wrong.sort_by_key(|e| matches!(e, ExecutorError::Hangs { .. }));
+    wrong.into_iter().next().map_or(Ok(summary), Err)
 }
 
 /// What the threads tell each other of a run's beginning and end.

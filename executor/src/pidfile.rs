@@ -23,8 +23,8 @@ const LOOKED_AT: Duration = Duration::from_millis(200);
 pub(crate) enum PidFileError {
     /// Another one runs.
     #[error(
-        "all places are taken: an executor runs for this robot under this root path already, process \
-         {pid}; `executor ctl` commands it, `kill {pid}` ends it"
+        "all places are taken: an executor runs for this robot under this root path already, \
+         process {pid}; `executor ctl` commands it, `kill {pid}` ends it"
     )]
     Taken {
         /// It.

@@ -120,8 +120,8 @@ impl LoopEnd {
 }
 
 /// Who decides about the order that waits for the loop: the loop, which carries it out, or the
-/// service, which withdraws it. The first one does, so that an order which was answered as withdrawn
-/// is never carried out later. Tickets rise; one is open at a time.
+/// service, which withdraws it. The first one does, so that an order which was answered as
+/// withdrawn is never carried out later. Tickets rise; one is open at a time.
 #[derive(Clone, Debug, Default)]
 pub struct Claim(Arc<AtomicU64>);
 

@@ -133,9 +133,9 @@ pub struct PlanHeader {
     pub join_rule: u32,
     /// The knot of `join_plan` in which this plan starts, for [`JoinRule::AtKnot`].
     pub join_knot: u32,
-    /// Non-zero: the velocity may step in every knot of a [`Interpolation::Linear`] plan, in the first
-    /// and the last one too: bang-bang. Zero: it steps by no more than the joints may change it in a
-    /// cycle.
+    /// Non-zero: the velocity may step in every knot of a [`Interpolation::Linear`] plan, in the
+    /// first and the last one too: bang-bang. Zero: it steps by no more than the joints may change
+    /// it in a cycle.
     pub corners: u32,
     /// Zero.
     pub reserved: u32,

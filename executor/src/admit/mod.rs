@@ -60,8 +60,8 @@ impl Rules {
 ///
 /// # Errors
 /// The first rule that it breaks, in this order: counts and enum values, checksum, epoch, robot,
-/// held joints, finite values, time order, soft limits, velocity, acceleration and jerk, rest at the
-/// end, corners.
+/// held joints, finite values, time order, soft limits, velocity, acceleration and jerk, rest at
+/// the end, corners.
 pub fn admit(
     header: &PlanHeader,
     knots: &[Knot],

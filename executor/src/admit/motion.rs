@@ -2,9 +2,10 @@
 //!
 //! What is bounded: positions everywhere, with the braking margin at each segment's speed;
 //! velocities everywhere; of curves the acceleration everywhere and the jerk within each segment,
-//! where the URDF gives a limit of it. Between two curves the acceleration may step, by no more than
-//! its limits leave room for. Straight segments have neither, but corners: steps of the velocity,
-//! which are bang-bang where the plan asks for them, and else no more than a cycle's worth.
+//! where the URDF gives a limit of it. Between two curves the acceleration may step, by no more
+//! than its limits leave room for. Straight segments have neither, but corners: steps of the
+//! velocity, which are bang-bang where the plan asks for them, and else no more than a cycle's
+//! worth.
 
 use nullsweep_ipc_types::{Interpolation, Reason};
 
@@ -72,8 +73,8 @@ pub(super) fn check_end(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection
 }
 
 /// Straight segments without leave for corners: the velocity steps nowhere by more than each joint
-/// may change it in a cycle. At both ends the arm holds, but for a plan that joins another one: that
-/// its first velocity is the one there is judged when it does.
+/// may change it in a cycle. At both ends the arm holds, but for a plan that joins another one:
+/// that its first velocity is the one there is judged when it does.
 pub(super) fn check_corners(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
     if plan.has_corners() || plan.interpolation() == Interpolation::Cubic {
         return Ok(());

@@ -269,7 +269,8 @@ fn jerk_is_bounded_in_curves_where_there_is_a_limit() {
     assert!(judge(&guard, 0.1).is_ok());
 }
 
-/// A polyline that speeds up and slows down by no more than its joint may each cycle needs no leave.
+/// A polyline that speeds up and slows down by no more than its joint may each cycle needs no
+/// leave.
 #[test]
 fn a_polyline_without_corners_needs_no_leave_for_them() {
     let guard = pr2();

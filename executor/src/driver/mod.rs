@@ -238,8 +238,8 @@ impl<H: Hardware> Driver<H> {
         let _ = self.slots.reports.push(report);
     }
 
-    /// What is carried out in this cycle: what a signal asks for before all else, then the order that
-    /// waits, unless it was withdrawn.
+    /// What is carried out in this cycle: what a signal asks for before all else, then the order
+    /// that waits, unless it was withdrawn.
     fn decide(&mut self, ask: Option<Ask>) -> Option<Ask> {
         if let Some(order) = self.alarm.take(self.state.is_shutting_down()) {
             self.early.ask = ask;

@@ -70,7 +70,8 @@ pub(crate) fn take<'a>(from: &mut &'a [u8]) -> Option<(Tag, &'a [u8])> {
 #[repr(C)]
 pub(crate) struct GuardRecord {
     dof: u64,
-    /// Lower, upper, velocity, acceleration, jerk and k_position (NaN for none), continuous (0 or 1).
+    /// Lower, upper, velocity, acceleration, jerk and k_position (NaN for none), continuous (0 or
+    /// 1).
     joints: [[f64; 7]; MAX_DOF],
     period_ns: u64,
     stale_ns: u64,

@@ -25,8 +25,8 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// A system that executes a long plan, has `stop` done to it, and must hold after it. The plan's end
-/// is seen by a listener that was there before.
+/// A system that executes a long plan, has `stop` done to it, and must hold after it. The plan's
+/// end is seen by a listener that was there before.
 fn stops(system: &System, stop: impl FnOnce()) {
     let events = system.ipc.event_receiver().unwrap();
     let mut publisher = system.ipc.plan_publisher(200).unwrap();

@@ -115,8 +115,8 @@ impl CommandServer {
         Ok(Self { server, _service: service })
     }
 
-    /// The next request that waits. Until it is answered or dropped it counts as one of its client's
-    /// [`COMMAND_REQUESTS`].
+    /// The next request that waits. Until it is answered or dropped it counts as one of its
+    /// client's [`COMMAND_REQUESTS`].
     pub fn receive(&self) -> Result<Option<Request>, PortError> {
         Ok(self.server.receive()?.map(Request))
     }

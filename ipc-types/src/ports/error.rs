@@ -97,8 +97,9 @@ pub enum IpcError {
     },
     /// A file of iceoryx2's is half made or damaged.
     #[error(
-        "{what}: {}, which belongs to {owner}, is of no use ({detail}): a process died while it made \
-         it, or another user wrote to it; remove it and try again: no process that runs needs it",
+        "{what}: {}, which belongs to {owner}, is of no use ({detail}): a process died while it \
+         made it, or another user wrote to it; remove it and try again: no process that runs needs \
+         it",
         .file.display()
     )]
     Spoilt {

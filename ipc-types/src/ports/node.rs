@@ -232,8 +232,8 @@ mod tests {
         assert!(need_shared_memory(0).is_ok());
     }
 
-    /// Opens a second door while the node counter holds `content`: how long it took, the counter, and
-    /// what was said.
+    /// Opens a second door while the node counter holds `content`: how long it took, the counter,
+    /// and what was said.
     fn opened(content: &[u8]) -> (Duration, PathBuf, IpcError) {
         let root = tempfile::TempDir::new().unwrap();
         let first = Ipc::open("pr2", Some(root.path())).unwrap();

@@ -1,9 +1,8 @@
 //! What `urdf-rs` does not tell: which attributes the text really has.
 //!
-//! `urdf-rs` fills a missing `<limit>` and missing soft limits with zeros, drops words that are
-//! not numbers from vectors, and ignores `acceleration` and `jerk` in files that do not declare URDF
-//! 1.2.
-//! A second, shallow reading of the same text restores what matters.
+//! `urdf-rs` fills a missing `<limit>` and missing soft limits with zeros, drops words that are not
+//! numbers from vectors, and ignores `acceleration` and `jerk` in files that do not declare URDF
+//! 1.2. A second, shallow reading of the same text restores what matters.
 
 use std::collections::HashMap;
 
@@ -11,9 +10,9 @@ use quick_xml::Reader;
 use quick_xml::escape::unescape;
 use quick_xml::events::{BytesStart, Event};
 
-/// How deep elements may be nested. A URDF's own elements go 6 deep and the plugins that are put into
-/// it hardly deeper than 12; `urdf-rs` reads elements by recursion, and time that grows with the
-/// square of the depth.
+/// How deep elements may be nested. A URDF's own elements go 6 deep and the plugins that are put
+/// into it hardly deeper than 12; `urdf-rs` reads elements by recursion, and time that grows with
+/// the square of the depth.
 const DEPTH: usize = 128;
 
 /// What the text of one `<joint>` holds.
