@@ -80,7 +80,7 @@ wire_enum! {
 
 /// One step in the life of a plan. For a rejection, `joint`, `knot`, `value` and `bound` say
 /// where and by how much; for an acceptance, `value` is the time from the publication to the end
-/// of the check. \[s\]
+/// of the check, and `bound` how long the plan takes at full speed. \[s\]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("nullsweep.PlanEvent.v1")]

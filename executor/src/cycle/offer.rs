@@ -34,7 +34,7 @@ impl State {
                 return;
             }
         };
-        let waited = Rejection::new(Reason::None).value(plan.waited(), f64::NAN);
+        let waited = Rejection::new(Reason::None).value(plan.waited(), plan.duration() * 1e-9);
         out.tell(id, EventKind::Accepted, waited);
         self.fault = Fault::None;
         let Some(turn) = turn else {

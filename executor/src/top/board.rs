@@ -3,9 +3,11 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanEvent, Reason, Telemetry};
+use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanEvent, PlanId, Reason, Telemetry};
 use nullsweep_robot::Arm;
 
+/// Plans whose lengths are kept.
+const PLANS: usize = 16;
 /// Lines of the log that are kept.
 const LINES: usize = 200;
 /// Telemetry older than this is of an executor that is gone or stuck: it sends 100 a second.
@@ -33,6 +35,8 @@ pub(super) struct Board {
     pub(super) answer: String,
     /// Why nothing is heard, where that is known.
     pub(super) trouble: Option<String>,
+    /// How long plans take at full speed, the newest last. \[s\]
+    lengths: VecDeque<(PlanId, f64)>,
     /// Deadlines that the last line says were missed.
     streak: u64,
     seen: Seen,
@@ -68,6 +72,7 @@ impl Board {
             log: VecDeque::with_capacity(LINES),
             answer: String::new(),
             trouble: None,
+            lengths: VecDeque::with_capacity(PLANS),
             streak: 0,
             seen: Seen::default(),
         }
@@ -88,6 +93,12 @@ impl Board {
         let limits = (f64::NEG_INFINITY, f64::INFINITY);
         let most = count.min(telemetry.commanded.len());
         (0..most).map(|j| Joint { name: format!("joint {j}"), unit: "", limits }).collect()
+    }
+
+    /// How long a plan takes at full speed, where its acceptance was heard. \[s\]
+    pub(super) fn length(&self, plan: PlanId) -> Option<f64> {
+        let known = self.lengths.iter().find(|(id, _)| *id == plan);
+        known.map(|(_, length)| *length).filter(|length| *length > 0.0)
     }
 
     pub(super) fn log(&self) -> impl DoubleEndedIterator<Item = &str> {
@@ -126,6 +137,12 @@ impl Board {
 
     /// Takes a plan's event in.
     pub(super) fn event(&mut self, event: &PlanEvent) {
+        if event.kind == EventKind::Accepted.wire() {
+            if self.lengths.len() == PLANS {
+                self.lengths.pop_front();
+            }
+            self.lengths.push_back((event.plan, event.bound));
+        }
         let kind = EventKind::from_wire(event.kind).map_or("unknown event", EventKind::text);
         let mut text = format!("plan {} {kind}", event.plan);
         match Reason::from_wire(event.reason) {

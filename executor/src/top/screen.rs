@@ -53,7 +53,7 @@ fn draw_head(frame: &mut Frame<'_>, area: Rect, board: &Board, telemetry: Option
             let why = board.trouble.as_deref().unwrap_or("no telemetry comes");
             vec![Line::styled(format!("waiting for an executor: {why}"), Color::Yellow)]
         }
-        Some(t) => vec![state(t, &board.answer), motion(t)],
+        Some(t) => vec![state(t, &board.answer), motion(t, board.length(t.plan))],
     };
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
@@ -78,11 +78,18 @@ fn state<'a>(t: &Telemetry, answer: &'a str) -> Line<'a> {
     Line::from(spans)
 }
 
-/// The plan, where it is and how fast.
-fn motion(t: &Telemetry) -> Line<'static> {
+/// The plan of that length \[s\], where it is and how fast.
+fn motion(t: &Telemetry, length: Option<f64>) -> Line<'static> {
     let plan = if t.plan.is_some() {
         let seconds = t.plan_time_ns as f64 * 1e-9;
-        format!("plan {}  knot {}  {seconds:.2} s into it", t.plan, t.knot)
+        let whole = length.map_or_else(String::new, |length| {
+            let done = 100.0 * (seconds / length).min(1.0);
+            let left = (length - seconds).max(0.0) / t.speed_scale;
+            // At a stand-still there is no end to see.
+            let left = if left.is_finite() { format!(", {left:.1} s left") } else { String::new() };
+            format!(" of {length:.2} s ({done:.0} %{left})")
+        });
+        format!("plan {}  knot {}  {seconds:.2} s{whole}", t.plan, t.knot)
     } else {
         "no plan".into()
     };

@@ -47,12 +47,15 @@ fn picture(board: &Board, now: Instant, size: (u16, u16)) -> (String, Terminal<T
 #[test]
 fn a_running_plan_is_shown_with_its_joints() {
     let (mut board, now) = (board(), Instant::now());
+    let plan = executing().plan;
+    let kind = EventKind::Accepted.wire();
+    board.event(&PlanEvent { plan, kind, bound: 5.0, ..PlanEvent::zeroed() });
     board.hear(executing(), now);
     let (text, terminal) = picture(&board, now, (110, 40));
     for part in [
         "executor of robot pr2",
         "executing",
-        "plan abc/2  knot 17  1.25 s into it  speed 50 %  cycle 5000, 0 missed",
+        "plan abc/2  knot 17  1.25 s of 5.00 s (25 %, 7.5 s left)  speed 50 %  cycle 5000, 0 missed",
         "r_shoulder_lift_joint",
         "0.3000 rad",
         "+0.1000",

@@ -174,9 +174,13 @@ pub fn describe(event: &PlanEvent) -> String {
     if event.joint != u32::MAX {
         text += &format!(", joint {}", event.joint);
     }
-    if event.kind == EventKind::Accepted.wire() && event.value.is_finite() {
-        text += &format!(" {:.1} ms after its publication", event.value * 1e3);
-    } else if event.value.is_finite() {
+    if event.kind == EventKind::Accepted.wire() {
+        if event.value.is_finite() {
+            text += &format!(" {:.1} ms after its publication", event.value * 1e3);
+        }
+        return text;
+    }
+    if event.value.is_finite() {
         text += &format!(", value {:.6}", event.value);
     }
     if event.bound.is_finite() {
