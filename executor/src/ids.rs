@@ -12,7 +12,7 @@ const REMEMBERED: usize = 1024;
 /// The ids of the newest plans that came with their seal unbroken. Of those that are forgotten the
 /// newest epoch is kept: whatever is not newer than that counts as known, so that memory is bounded
 /// and still no id is taken twice. A plan is published a moment before it comes, so a new one is
-/// refused only if more than [`REMEMBERED`] newer ones have come before it.
+/// refused only if more than 1024 newer ones have come before it.
 #[derive(Debug, Default)]
 pub struct Ids {
     known: VecDeque<PlanId>,

@@ -42,7 +42,7 @@ struct Shared {
     ended: AtomicBool,
 }
 
-/// The log. Writing to a [`Line`] of it never blocks and never fails.
+/// The log. Writing a line to it never blocks and never fails.
 #[derive(Debug)]
 pub struct Log {
     shared: Arc<Shared>,

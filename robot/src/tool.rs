@@ -37,8 +37,9 @@ pub struct Tool {
     pub across: [f64; 3],
     /// Distance kept between pad centre and surface, along the normal. \[m\]
     pub stand_off: f64,
-    /// How far the pad's soft body may be pressed in, along its axis, anywhere in its rectangle. \[m\]
-    #[serde(default = "default_press_max")]
+    /// How far the pad's soft body may be pressed in, along its axis, anywhere in its rectangle; a
+    /// third of its thickness where a file does not say it. \[m\]
+    #[serde(default = "unsaid")]
     pub press_max: f64,
     /// Whether a heading and its opposite are the same contact.
     pub symmetric: bool,
@@ -48,9 +49,9 @@ pub struct Tool {
     pub reach_angle: f64,
 }
 
-/// Of a tool file that does not say it: a third of the default sponge. \[m\]
-fn default_press_max() -> f64 {
-    0.010
+/// Stands for a `press_max` that a file does not have.
+fn unsaid() -> f64 {
+    f64::NEG_INFINITY
 }
 
 impl Default for Tool {
@@ -66,7 +67,7 @@ impl Default for Tool {
             approach: [1.0, 0.0, 0.0],
             across: [0.0, 1.0, 0.0],
             stand_off: 0.0,
-            press_max: default_press_max(),
+            press_max: 0.010,
             symmetric: true,
             reach_normal: 0.010,
             reach_angle: 30f64.to_radians(),
@@ -126,7 +127,10 @@ impl Serialize for Tool {
 
 impl<'de> Deserialize<'de> for Tool {
     fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
-        let tool = Self::deserialize(input)?;
+        let mut tool = Self::deserialize(input)?;
+        if tool.press_max == unsaid() {
+            tool.press_max = tool.thickness / 3.0;
+        }
         tool.check().map_err(D::Error::custom)?;
         Ok(tool)
     }
@@ -147,6 +151,7 @@ impl Tool {
             ("centre[1]", y, "m", (-FAR, FAR)),
             ("centre[2]", z, "m", (-FAR, FAR)),
             ("stand_off", self.stand_off, "m", (-FAR, FAR)),
+            ("press_max", self.press_max, "m", (0.0, self.thickness)),
             ("reach_normal", self.reach_normal, "m", (0.0, FAR)),
             ("reach_angle", self.reach_angle, "rad", (0.0, PI)),
         ] {
@@ -220,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_tool_that_cannot_be_is_refused_by_its_field() {
-        let spoil: [(&str, Spoil); 14] = [
+        let spoil: [(&str, Spoil); 15] = [
             ("length is 0 m", |t| t.length = 0.0),
             ("width is NaN m", |t| t.width = f64::NAN),
             ("thickness is -0.03 m", |t| t.thickness = -0.03),
@@ -228,6 +233,7 @@ mod tests {
             ("width is 0.00000000000000000001 m", |t| t.width = 1e-20),
             ("centre[1] is NaN m", |t| t.centre[1] = f64::NAN),
             ("stand_off is -inf m", |t| t.stand_off = f64::NEG_INFINITY),
+            ("press_max is 0.031 m", |t| t.press_max = 0.031),
             ("reach_normal is -1 m", |t| t.reach_normal = -1.0),
             ("reach_angle is 4 rad", |t| t.reach_angle = 4.0),
             ("approach is [0.0, 0.0, 0.0]", |t| t.approach = [0.0; 3]),

@@ -23,6 +23,7 @@ fn nobody(script: &str, arguments: &[&Path]) -> Option<String> {
 /// What is tried with each file; whatever succeeds is said. A file that is gone was the executor's
 /// to remove.
 const FILE: &str = r#"for file in "$@"; do
+    [ -e "$file" ] || continue
     head -c 1 "$file" >/dev/null 2>&1 && [ -f "$file" ] && echo "read $file"
     (printf x >>"$file") 2>/dev/null && echo "written $file"
     (: >"$file") 2>/dev/null && echo "emptied $file"

@@ -23,8 +23,8 @@ use crate::scene::{Demo, SceneArgs, scene};
 #[derive(Debug, Args)]
 pub(super) struct ExperimentArgs {
     /// The paper's object, simulated; with --scan it says which table stands beside ours.
-    #[arg(value_enum)]
-    object: ObjectArg,
+    #[arg(value_enum, value_name = "OBJECT")]
+    paper_object: ObjectArg,
     /// A scan instead of the simulated object, several are joined; the paper's figures do not
     /// belong to it and are left out.
     #[arg(long = "scan", value_name = "FILE")]
@@ -61,7 +61,7 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
     let robot = Robot::pr2();
     bars.stage("scan", None);
-    let demo = match Object::from(args.object) {
+    let demo = match Object::from(args.paper_object) {
         Object::Chair => Demo::Chair,
         Object::BobbyCar => Demo::BobbyCar,
     };
@@ -78,14 +78,14 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
     let setting = Setting::new(&robot, &scene.surface, &job)?;
     let title = match args.scans.first().and_then(|path| path.file_stem()) {
         Some(stem) => format!("Experiment: {}", stem.to_string_lossy()),
-        None => format!("Experiment: {}", name(args.object.into())),
+        None => format!("Experiment: {}", name(args.paper_object.into())),
     };
     let samples = match &args.ik_samples[..] {
-        [] => experiment::samples(args.object.into()).to_vec(),
+        [] => experiment::samples(args.paper_object.into()).to_vec(),
         given => given.iter().map(|&n| n.max(1) as usize).collect(),
     };
     let plan = Plan {
-        object: args.scans.is_empty().then_some(args.object.into()),
+        object: args.scans.is_empty().then_some(args.paper_object.into()),
         title,
         samples,
         repeats: args.repeats as usize,
@@ -111,7 +111,7 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
         };
         std::fs::create_dir_all(directory)
             .with_context(|| format!("cannot make {}", directory.display()))?;
-        let name = name(args.object.into());
+        let name = name(args.paper_object.into());
         write(&format!("{name}.md"), &tables)?;
         write(&format!("{name}.csv"), &experiment::csv(&report))?;
         write_json(&report, &directory.join(format!("{name}.json")))?;
