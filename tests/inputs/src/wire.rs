@@ -254,6 +254,7 @@ fn message(number: u64, interpolation: Interpolation, join_rule: u32) -> Vec<u8>
         id: PlanId { epoch: NOW - 5, number },
         fingerprint: arm.fingerprint(),
         joint_count: arm.dof() as u32,
+        corners: u32::from(interpolation == Interpolation::Linear),
         knot_count: knots.len() as u32,
         interpolation: interpolation.wire(),
         join_rule,

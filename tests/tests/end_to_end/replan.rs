@@ -43,7 +43,7 @@ fn args(command: &str, out: &Path, more: &[&str]) -> Vec<OsString> {
 /// A system that sweeps by a first plan, and that plan's file.
 fn sweeping(stage: &Stage) -> (System, PathBuf) {
     let path = stage.file("first.json");
-    let place = ["--cost", "effort", "--base=0.1,0.55,-1.2", "--torso", "0.2"];
+    let place = ["--cost", "effort", "--base=-0.708,-0.004,1.047", "--torso", "0.2"];
     let (code, said) = planner(stage, "plan", &args("plan", &path, &place));
     assert_eq!(code, Some(0), "{said}");
     let mut system = rig::start(stage, &["--plan", path.to_str().expect("UTF-8")]);
@@ -151,7 +151,7 @@ fn a_plan_that_comes_too_late_goes_on_from_where_the_arm_was_stopped() {
 fn without_a_running_plan_there_is_nothing_to_replan() {
     let stage = stage();
     let path = stage.file("first.json");
-    let place = ["--base=0.1,0.55,-1.2", "--torso", "0.2"];
+    let place = ["--base=-0.708,-0.004,1.047", "--torso", "0.2"];
     let (code, said) = planner(&stage, "plan", &args("plan", &path, &place));
     assert_eq!(code, Some(0), "{said}");
     let _system = rig::start(&stage, &["--plan", path.to_str().expect("UTF-8")]);

@@ -20,6 +20,9 @@ pub(super) fn axes(normal: &UnitVector3<f64>) -> [Vector3<f64>; 2] {
     [u, normal.cross(&u)]
 }
 
+/// Twice the area of a triangle below which its corners lie on one line. \[m²\]
+const STRAIGHT: f64 = 1e-12;
+
 /// The convex hull of points seen along a normal, at the mean height of all, counter-clockwise
 /// (Andrew's monotone chain, 1979).
 pub(super) fn hull(points: &[Point3<f64>], normal: &UnitVector3<f64>) -> Vec<Point3<f64>> {
@@ -35,7 +38,7 @@ pub(super) fn hull(points: &[Point3<f64>], normal: &UnitVector3<f64>) -> Vec<Poi
         let first = corners.len();
         for p in way {
             while let [.., a, b] = corners[first..]
-                && (b - a).perp(&(p - b)) <= 0.0
+                && (b - a).perp(&(p - b)) <= STRAIGHT
             {
                 corners.pop();
             }
