@@ -52,7 +52,7 @@ pub(super) struct Args {
     /// Where the robot stands: x,y,yaw before the chair, or auto, which searches for longer
     #[arg(
         long,
-        default_value = "0.1,0.55,-1.2",
+        default_value = "-0.708,-0.004,1.047",
         allow_hyphen_values = true,
         value_name = "X,Y,YAW"
     )]
