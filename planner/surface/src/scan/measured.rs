@@ -11,8 +11,8 @@ use crate::grid::Grid;
 const STANDS_FOR: f64 = 0.015;
 /// A thing has at least this many points more …
 const COMPANY: usize = 3;
-/// … this near to each of its points; a pixel that flies alone between fore- and background has
-/// fewer. \[m\]
+/// … this near to each of its points, or four spacings of the surface; a pixel that flies alone
+/// between fore- and background has fewer. \[m\]
 const NEAR: f64 = 0.02;
 
 /// All points of a scan beside its cleaned surface, in the surface's frame. \[m\]
@@ -22,7 +22,8 @@ pub struct Measured {
     pub raw: Vec<Point3<f64>>,
     /// Those that it leaves out: what lies beside the region, and what cleaning has dropped.
     pub rest: Vec<Point3<f64>>,
-    /// Flying pixels: left out by the surface, and alone.
+    /// Flying pixels: left out by the surface, and alone. Only a depth camera has them: where no
+    /// sensor is known, every point is a thing.
     pub flying: Vec<Point3<f64>>,
 }
 
@@ -31,20 +32,27 @@ pub struct Measured {
 pub fn measured(scan: &PlacedScan, surface: &Scan) -> Measured {
     let all: Vec<Point3<f64>> =
         scan.views.iter().flat_map(|view| view.points.iter().copied()).collect();
+    let of_camera: Vec<bool> = scan
+        .views
+        .iter()
+        .flat_map(|view| std::iter::repeat_n(view.sensor.is_some(), view.points.len()))
+        .collect();
+    let near = NEAR.max(4.0 * surface.spacing);
     let known = Grid::new(&surface.points, STANDS_FOR);
-    let company = Grid::new(&all, NEAR);
+    let company = Grid::new(&all, near);
     let is_known = |p: &Point3<f64>| known.nearest(p, STANDS_FOR, |_| true).is_some();
     let is_alone = |p: &Point3<f64>| {
-        let mut near = 0;
-        company.within(p, NEAR, |_, _, _| near += 1);
+        let mut others = 0;
+        company.within(p, near, |_, _, _| others += 1);
         // The point itself is among them.
-        near <= COMPANY
+        others <= COMPANY
     };
     let kinds: Vec<(bool, bool)> = all
         .par_iter()
-        .map(|p| {
+        .zip(&of_camera)
+        .map(|(p, of_camera)| {
             let known = is_known(p);
-            (known, !known && is_alone(p))
+            (known, *of_camera && !known && is_alone(p))
         })
         .collect();
     let mut measured = Measured::default();
@@ -83,10 +91,15 @@ mod tests {
             (1..20).map(|i| Point3::new(0.07, 0.07, 0.02 + 0.005 * f64::from(i))).collect();
         let pixel = Point3::new(0.0, 0.0, 0.1);
         let points = noisy.iter().chain(&post).copied().chain([pixel]).collect();
-        let placed = PlacedScan { views: vec![View { points, normals: None, sensor: None }] };
+        let sensor = Some(Point3::new(0.0, 0.0, 2.0));
+        let mut placed = PlacedScan { views: vec![View { points, normals: None, sensor }] };
         let found = measured(&placed, &surface);
         assert_eq!(found.raw, noisy);
         assert_eq!(found.rest, post);
         assert_eq!(found.flying, [pixel]);
+        placed.views[0].sensor = None;
+        let found = measured(&placed, &surface);
+        assert_eq!(found.rest.len(), post.len() + 1);
+        assert_eq!(found.flying, []);
     }
 }
