@@ -115,7 +115,9 @@ fn pipeline(error: &PipelineError) -> Option<String> {
 
 fn task(error: &TaskError) -> Option<String> {
     match error {
-        TaskError::NothingMet { .. } => Some("--chain BASE,TIP names the tip link; --floor says how high the floor is".into()),
+        TaskError::NothingMet { .. } => {
+            Some("--chain BASE,TIP names the tip link; --floor says how high the floor is".into())
+        }
         TaskError::Collision(error) => collision(error),
         _ => None,
     }
