@@ -63,13 +63,9 @@ struct Lab<'a> {
 
 /// Runs with the arguments of a command line, program name first.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Vec<_> = args.into_iter().collect();
-    if let Some(code) = parts::play(&args) {
-        return code;
-    }
-    let args = match Args::try_parse_from(args) {
+    let args: Args = match parts::begin(args) {
         Ok(args) => args,
-        Err(error) => error.exit(),
+        Err(code) => return code,
     };
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
@@ -81,12 +77,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    let stage = Stage::new(std::env::current_exe()?, "pr2")?;
-    let result = kill_all(args, &stage);
-    if let Some(folder) = &args.keep {
-        stage.copy_files(folder).with_context(|| format!("cannot fill {}", folder.display()))?;
-    }
-    result
+    Stage::with(args.keep.as_deref(), |stage| kill_all(args, stage))
 }
 
 fn kill_all(args: &Args, stage: &Stage) -> anyhow::Result<()> {

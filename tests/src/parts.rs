@@ -1,11 +1,26 @@
 //! How one program plays every part: with a hidden first argument it becomes the planner, the
-//! executor or the mock, each with that program's own command line.
+//! executor or the mock, each with that program's own command line; else it is itself, by its own.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
+use clap::Parser;
+
 use crate::stage::{Part, die_with_parent};
 use crate::{mock, publisher};
+
+/// The arguments of a program that plays other parts too, program name first. A command line that is
+/// wrong, or asks for help, ends the process.
+///
+/// # Errors
+/// The exit code, where it has played another part.
+pub fn begin<A: Parser>(args: impl IntoIterator<Item = OsString>) -> Result<A, ExitCode> {
+    let args: Vec<_> = args.into_iter().collect();
+    match play(&args) {
+        Some(code) => Err(code),
+        None => Ok(A::try_parse_from(args).unwrap_or_else(|error| error.exit())),
+    }
+}
 
 /// Plays the part that the first argument names and gives its exit code; `None` where it names
 /// no part and the program shall go on as itself.

@@ -8,6 +8,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use std::{io, thread};
 
+use anyhow::Context;
 use rustix::process::{Pid, Signal, getppid, kill_process, set_parent_process_death_signal};
 use tempfile::TempDir;
 
@@ -68,6 +69,22 @@ impl Stage {
     pub fn new(program: impl Into<PathBuf>, robot: &str) -> io::Result<Self> {
         let folder = TempDir::with_prefix("nullsweep-")?;
         Ok(Self { folder, program: program.into(), robot: robot.into() })
+    }
+
+    /// Does `work` on a stage for the PR2 whose processes are this program started again, and then
+    /// copies the stage's files to `keep`, whatever came of it.
+    pub fn with<T>(
+        keep: Option<&Path>,
+        work: impl FnOnce(&Self) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
+        let stage = Self::new(std::env::current_exe()?, "pr2")?;
+        let result = work(&stage);
+        if let Some(folder) = keep {
+            stage
+                .copy_files(folder)
+                .with_context(|| format!("cannot fill {}", folder.display()))?;
+        }
+        result
     }
 
     /// The robot's name in the services' names.

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use clap::{Parser, ValueEnum};
+use clap::ValueEnum;
 use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
 use nullsweep_planner::plan::Plan;
 
@@ -35,13 +35,9 @@ const SWAP_AT: f64 = 0.35;
 /// Runs with the arguments of a command line, program name first; with a hidden first argument
 /// the program plays another part, see [`parts`].
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Vec<_> = args.into_iter().collect();
-    if let Some(code) = parts::play(&args) {
-        return code;
-    }
-    let args = match Args::try_parse_from(args) {
+    let args: Args = match parts::begin(args) {
         Ok(args) => args,
-        Err(error) => error.exit(),
+        Err(code) => return code,
     };
     match run(&args) {
         Ok(outcome) if outcome.checks.iter().all(|c| c.ok) => ExitCode::SUCCESS,
@@ -55,12 +51,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<Outcome> {
     args.hardware.check(args)?;
-    let stage = Stage::new(std::env::current_exe()?, "pr2")?;
-    let outcome = perform(args, &stage);
-    if let Some(folder) = &args.keep {
-        stage.copy_files(folder).with_context(|| format!("cannot fill {}", folder.display()))?;
-    }
-    let outcome = outcome?;
+    let outcome = Stage::with(args.keep.as_deref(), |stage| perform(args, stage))?;
     match &args.json {
         Some(path) if path.as_os_str() == "-" => {
             println!("{}", serde_json::to_string_pretty(&outcome)?);

@@ -18,7 +18,6 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use clap::Parser;
 use nullsweep_executor::rt;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::{CommandKind, EventKind, HISTOGRAM_BUCKETS, Mode, PlanEvent};
@@ -54,13 +53,9 @@ const SPREAD_NS: u64 = 40_000_000;
 
 /// Runs the lab with the arguments of a command line, program name first.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Vec<_> = args.into_iter().collect();
-    if let Some(code) = parts::play(&args) {
-        return code;
-    }
-    let args = match Args::try_parse_from(args) {
+    let args: Args = match parts::begin(args) {
         Ok(args) => args,
-        Err(error) => error.exit(),
+        Err(code) => return code,
     };
     match run(&args) {
         Ok(figures) if figures.violations == 0 => ExitCode::SUCCESS,

@@ -28,7 +28,7 @@ use memory::Memory;
 /// Time between two faults of the endpoint, and how long each lasts.
 const FAULT_EVERY: Duration = Duration::from_secs(15);
 const FAULT_LASTS: Duration = Duration::from_millis(300);
-/// The faults that it plays, in turns.
+/// Some of the endpoint's faults, which it plays in turns.
 const FAULTS: [FaultKind; 10] = [
     FaultKind::Halt,
     FaultKind::Stale,
@@ -47,7 +47,7 @@ const WARMEST: Duration = Duration::from_secs(120);
 /// What a process may grow by from then on. \[KiB\]
 const GROWTH: i64 = 1024;
 
-/// Runs the system for a while with everything that can happen to it.
+/// Runs the system for a while with much of what can happen to it.
 #[derive(Debug, Parser)]
 #[command(name = "soak", version)]
 struct Args {
@@ -64,13 +64,9 @@ struct Args {
 
 /// Runs with the arguments of a command line, program name first.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Vec<_> = args.into_iter().collect();
-    if let Some(code) = parts::play(&args) {
-        return code;
-    }
-    let args = match Args::try_parse_from(args) {
+    let args: Args = match parts::begin(args) {
         Ok(args) => args,
-        Err(error) => error.exit(),
+        Err(code) => return code,
     };
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
@@ -83,12 +79,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     let length = Duration::try_from_secs_f64(60.0 * args.minutes).context("--minutes")?;
-    let stage = Stage::new(std::env::current_exe()?, "pr2")?;
-    let result = soak(length, args.seed, &stage);
-    if let Some(folder) = &args.keep {
-        stage.copy_files(folder).with_context(|| format!("cannot fill {}", folder.display()))?;
-    }
-    result
+    Stage::with(args.keep.as_deref(), |stage| soak(length, args.seed, stage))
 }
 
 fn soak(length: Duration, seed: u64, stage: &Stage) -> anyhow::Result<()> {
