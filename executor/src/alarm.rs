@@ -38,7 +38,8 @@ impl Alarm {
     }
 
     /// Asks for what SIGUSR1 does, or SIGUSR2.
-    pub fn ring(&self, disable: bool) {
+    #[cfg(test)]
+    pub(crate) fn ring(&self, disable: bool) {
         let flag = if disable { &self.disable } else { &self.stop };
         flag.store(true, Ordering::Release);
     }

@@ -214,7 +214,7 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         if (0.0..=most).contains(&value) {
             Ok(value)
         } else {
-            bail!("{name} must be from 0 to {most}, not {value}")
+            bail!(Usage(format!("{name} must be from 0 to {most}, not {value}")))
         }
     };
     let nanos = |name: &str, ms: f64| positive(name, ms).map(|ms| (ms * 1e6) as u64);

@@ -81,8 +81,7 @@ pub(crate) fn command(args: &CtlArgs) -> anyhow::Result<ExitCode> {
         Ctl::Status => (CommandKind::Status, 0.0),
     };
     let signalled = match args.order {
-        Ctl::Stop { disable, .. } => Running::find(robot_name, ipc_root.as_deref())
-            .filter(|running| running.stop(disable).is_ok()),
+        Ctl::Stop { disable, .. } => Running::stopped(&args.system, disable),
         _ => None,
     };
     let (robot, root) = (robot_name.clone(), ipc_root.clone());

@@ -127,7 +127,12 @@ impl Asked {
         }
         if waited >= TAKE_WITHIN + ANSWER_WITHIN {
             // Whether it is carried out is not known here: no answer is the true one.
-            tracing::error!("the loop took a command and has not answered it");
+            let kind = CommandKind::from_wire(self.request.command().kind);
+            tracing::error!(
+                "the loop took {} and has not answered it: `executor ctl status` says whether it was \
+                 carried out; if that is not answered either, stop with `executor ctl stop`",
+                kind.map_or_else(|| "a command".into(), |kind| format!("{kind:?}"))
+            );
             return None;
         }
         Some(self)

@@ -12,6 +12,8 @@ use rustix::fd::OwnedFd;
 use rustix::process::{Pid, PidfdFlags, Signal, geteuid, pidfd_open, pidfd_send_signal};
 use xxhash_rust::xxh3::xxh3_64;
 
+use crate::system::SystemArgs;
+
 /// The folder of such files, in a folder for such things.
 const FOLDER: &str = "nullsweep";
 
@@ -139,6 +141,13 @@ impl Running {
         Ok(Self { pid, handle })
     }
 
+    /// The executor of a robot, after it was told by a signal to stop: past shared memory, whatever
+    /// has become of that. `None` where none is found, or none that may be signalled.
+    pub(crate) fn stopped(system: &SystemArgs, disable: bool) -> Option<Self> {
+        Self::find(&system.robot_name, system.ipc_root.as_deref())
+            .filter(|running| running.stop(disable).is_ok())
+    }
+
     /// Has it stop on its path, and disable the motors where that is asked for.
     ///
     /// # Errors
@@ -194,16 +203,15 @@ fn folders() -> Vec<PathBuf> {
 
 /// The first of them that is, or can be made, this user's alone.
 fn own_folder() -> Result<PathBuf, PidFileError> {
-    let mut why = None;
+    let (path, error) = (PathBuf::from(FOLDER), io::ErrorKind::NotFound.into());
+    let mut why = PidFileError::Write { path, error };
     for folder in folders() {
         match keep(&folder) {
             Ok(()) => return Ok(folder),
-            Err(error) => why = Some(PidFileError::Write { path: folder, error }),
+            Err(error) => why = PidFileError::Write { path: folder, error },
         }
     }
-    let nowhere =
-        || PidFileError::Write { path: "/tmp".into(), error: io::ErrorKind::NotFound.into() };
-    Err(why.unwrap_or_else(nowhere))
+    Err(why)
 }
 
 /// Makes a folder, and sees to it that no other user can put anything into it.

@@ -96,7 +96,7 @@ impl<H: Hardware> Driver<H> {
     }
 
     /// Heeds this alarm.
-    pub fn heed(&mut self, alarm: Alarm) {
+    pub(crate) fn heed(&mut self, alarm: Alarm) {
         self.alarm = alarm;
     }
 
@@ -212,7 +212,8 @@ impl<H: Hardware> Driver<H> {
             }
         }
         if let Some(reply) = out.reply {
-            // There is room: one order is asked at a time.
+            // There is room: one order is asked at a time. Only answers to signals may have filled it
+            // while the service hangs, and then nobody reads them.
             let _ = self.slots.replies.push(reply);
         }
         self.unreported += 1;

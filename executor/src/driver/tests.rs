@@ -12,19 +12,24 @@ use crate::testing::{HOME, MS, moved, plan};
 
 /// A held joint that moves while a plan runs stops the arm on its path; a whole turn, a small
 /// drift, or a move at rest does not.
+/// An arm that stands at home.
+fn at_home() -> JointStates {
+    let mut states = JointStates {
+        joint_count: 7,
+        status: status::CALIBRATED,
+        stamp_ns: 1,
+        ..JointStates::zeroed()
+    };
+    states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
+    states
+}
+
 #[test]
 fn a_moving_torso_stops_the_arm() {
     for (by, stops) in [(0.015, false), (TAU, false), (0.05, true), (f64::NAN, true)] {
         let guard = pr2();
         let Slots { looping, mut worker, mut service } = Slots::default();
-        let mut states = JointStates {
-            joint_count: 7,
-            held_count: 2,
-            status: status::CALIBRATED,
-            stamp_ns: 1,
-            ..JointStates::zeroed()
-        };
-        states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
+        let states = JointStates { held_count: 2, ..at_home() };
         let mut driver = Driver::new(Loopback::new(states, 2), guard, looping);
         let mut run = |cycles: std::ops::Range<u64>, torso: f64| {
             for cycle in cycles {
@@ -55,14 +60,7 @@ fn a_rehearsed_loop_does_the_same() {
     let run = |rehearsed: bool| {
         let guard = pr2();
         let Slots { looping, mut worker, mut service } = Slots::default();
-        let mut states = JointStates {
-            joint_count: 7,
-            status: status::CALIBRATED,
-            stamp_ns: 1,
-            ..JointStates::zeroed()
-        };
-        states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
-        let mut driver = Driver::new(Loopback::new(states, 2), guard, looping);
+        let mut driver = Driver::new(Loopback::new(at_home(), 2), guard, looping);
         let (mut seen, mut replies) = (Vec::new(), Vec::new());
         for cycle in 1..1100 {
             match cycle {
@@ -104,14 +102,7 @@ fn ask(service: &mut ServiceEnd, ticket: u64, order: Order) {
 /// A loop that holds, its ends, and the cycle that comes next.
 fn holding() -> (Driver<Loopback>, WorkerEnd, ServiceEnd, u64) {
     let Slots { looping, worker, service } = Slots::default();
-    let mut states = JointStates {
-        joint_count: 7,
-        status: status::CALIBRATED,
-        stamp_ns: 1,
-        ..JointStates::zeroed()
-    };
-    states.positions[..MAX_DOF].copy_from_slice(&HOME[..]);
-    let mut driver = Driver::new(Loopback::new(states, 2), pr2(), looping);
+    let mut driver = Driver::new(Loopback::new(at_home(), 2), pr2(), looping);
     for cycle in 1..20 {
         driver.cycle(at(cycle));
     }

@@ -169,7 +169,11 @@ impl Recorder {
     /// A recording with a hole cannot be replayed past it: ends it before the hole.
     fn begin_anew(&mut self) -> io::Result<()> {
         let lost = self.shared.lost.load(Ordering::Relaxed);
-        tracing::warn!("flight recorder: {} cycles were not written", lost - self.lost);
+        tracing::warn!(
+            "flight recorder: {} cycles were not written, the recording goes on in another file: a \
+             faster disk or less load keeps it whole",
+            lost - self.lost
+        );
         self.lost = lost;
         self.want_checkpoint();
         self.finish()

@@ -6,6 +6,11 @@ use std::time::{Duration, Instant};
 use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanEvent, PlanId, Reason, Telemetry};
 use nullsweep_robot::Arm;
 
+use crate::admit::Rejection;
+use crate::cycle;
+use crate::guard::Guard;
+use crate::words::Words;
+
 /// Plans whose lengths are kept.
 const PLANS: usize = 16;
 /// Lines of the log that are kept.
@@ -28,6 +33,7 @@ pub(super) struct Joint {
 pub(super) struct Board {
     pub(super) robot: String,
     joints: Vec<Joint>,
+    words: Words,
     newest: Option<(Telemetry, Instant)>,
     /// Oldest first.
     log: VecDeque<String>,
@@ -52,9 +58,9 @@ struct Seen {
 }
 
 impl Board {
-    /// Of an arm; without one the joints have numbers and no limits.
-    pub(super) fn new(robot: &str, arm: Option<&Arm>) -> Self {
-        let joint = |arm: &Arm, j: usize| Joint {
+    /// Of an arm.
+    pub(super) fn new(robot: &str, arm: &Arm) -> Self {
+        let joint = |j: usize| Joint {
             name: arm.joint_names()[j].clone(),
             unit: if arm.is_revolute(j) { "rad" } else { "m" },
             limits: if arm.limits()[j].continuous {
@@ -63,11 +69,10 @@ impl Board {
                 (arm.limits()[j].lower, arm.limits()[j].upper)
             },
         };
-        let joints =
-            arm.map_or_else(Vec::new, |arm| (0..arm.dof()).map(|j| joint(arm, j)).collect());
         Self {
             robot: robot.into(),
-            joints,
+            joints: (0..arm.dof()).map(joint).collect(),
+            words: Words::of(arm, robot, &Guard::new(arm.limits())),
             newest: None,
             log: VecDeque::with_capacity(LINES),
             answer: String::new(),
@@ -143,20 +148,15 @@ impl Board {
             }
             self.lengths.push_back((event.plan, event.bound));
         }
-        let kind = EventKind::from_wire(event.kind).map_or("unknown event", EventKind::text);
-        let mut text = format!("plan {} {kind}", event.plan);
-        match Reason::from_wire(event.reason) {
-            Some(Reason::None) => {}
-            Some(reason) => text.push_str(&format!(": {reason}")),
-            None => text.push_str(&format!(": reason {}", event.reason)),
-        }
-        if event.knot != u32::MAX {
-            text.push_str(&format!(", knot {}", event.knot));
-        }
-        if let Some(joint) = self.joints.get(event.joint as usize) {
-            text.push_str(&format!(", {}", joint.name));
-        }
-        self.say(text);
+        let PlanEvent { plan, joint, knot, value, bound, .. } = *event;
+        let known = EventKind::from_wire(event.kind).zip(Reason::from_wire(event.reason));
+        self.say(match known {
+            Some((kind, reason)) => {
+                let why = Rejection { reason, joint, knot, value, bound };
+                self.words.event(&cycle::Event { plan, kind, why })
+            }
+            None => format!("plan {plan}: event {}, reason {}", event.kind, event.reason),
+        });
     }
 
     /// Notes once that nothing is heard any more.

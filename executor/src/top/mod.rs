@@ -42,7 +42,7 @@ pub(crate) struct TopArgs {
 
 /// Shows the executor's state until `q`.
 pub(crate) fn top(args: &TopArgs, arm: &Arm) -> io::Result<ExitCode> {
-    let mut board = Board::new(&args.system.robot_name, Some(arm));
+    let mut board = Board::new(&args.system.robot_name, arm);
     let mut watch = Watch::new(&args.system);
     let mut terminal = ratatui::try_init()?;
     let shown = loop {

@@ -18,7 +18,7 @@ use super::screen::{bar, draw};
 
 fn board() -> Board {
     let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).unwrap();
-    Board::new("pr2", Some(&arm))
+    Board::new("pr2", &arm)
 }
 
 fn executing() -> Telemetry {
@@ -109,6 +109,8 @@ fn what_became_of_a_plan_is_told_with_its_joint() {
         reason: Reason::Velocity.wire(),
         knot: 12,
         joint: 3,
+        value: 3.5,
+        bound: 3.3,
         ..PlanEvent::zeroed()
     };
     board.event(&event);
@@ -116,11 +118,20 @@ fn what_became_of_a_plan_is_told_with_its_joint() {
         board.event(&PlanEvent { joint: u32::MAX, knot: u32::MAX, reason: 0, kind: 99, ..event });
     }
     let log: Vec<&str> = board.log().collect();
-    assert!(log.len() == 200 && log[0] == "plan 1/4 unknown event", "{log:?}");
+    assert!(log.len() == 200 && log[0] == "plan 1/4: event 99, reason 0", "{log:?}");
     let mut board = self::board();
     board.event(&event);
-    let told = format!("plan 1/4 rejected: {}, knot 12, r_elbow_flex_joint", Reason::Velocity);
-    assert_eq!(board.log().collect::<Vec<_>>(), [told.as_str()]);
+    let told = format!(
+        "plan 1/4 rejected: {}, knot 12, joint r_elbow_flex_joint: 3.5000 rad/s against the limit \
+         3.3000 rad/s; ",
+        Reason::Velocity
+    );
+    let said: Vec<&str> = board.log().collect();
+    assert!(said.len() == 1 && said[0].starts_with(&told), "{said:?}");
+    // The index of a held joint is none of the arm's.
+    board.event(&PlanEvent { reason: Reason::HeldJoint.wire(), joint: 1, ..event });
+    let held = board.log().last().unwrap();
+    assert!(held.contains("measured at") && !held.contains("r_shoulder"), "{held}");
 }
 
 /// Whatever comes over the wire and however small the window, there is a picture.

@@ -1,4 +1,5 @@
-//! The ports of a screen: they come and go with the executor, and nothing here waits for it.
+//! The ports of a screen: they come and go with the executor. An answer is waited for 300 ms; opening
+//! them may take seconds, where something of iceoryx2's is damaged.
 
 use std::time::{Duration, Instant};
 
@@ -6,6 +7,7 @@ use nullsweep_ipc_types::ports::{CommandClient, Ipc, IpcError, PortError, Receiv
 use nullsweep_ipc_types::{CommandKind, PlanEvent, Response, Telemetry, Verdict};
 
 use super::board::Board;
+use crate::pidfile::Running;
 use crate::system::SystemArgs;
 
 /// How long an answer is waited for.
@@ -61,10 +63,23 @@ impl Watch {
         value: f64,
         board: &mut Board,
     ) -> Option<f64> {
+        // A stop goes past shared memory first, as that of `executor ctl` does.
+        let signalled = match kind {
+            CommandKind::Stop => Running::stopped(&self.system, false),
+            CommandKind::StopAndDisable => Running::stopped(&self.system, true),
+            _ => None,
+        };
         let answer = match &mut self.ports {
             Some(ports) => ports.command(kind, value).map_err(|error| error.to_string()),
             None => Err("there is no executor".into()),
         };
+        let answer = answer.map_err(|error| match &signalled {
+            Some(running) => format!(
+                "sent to process {} as a signal; how it was taken is not known: {error}",
+                running.pid
+            ),
+            None => error,
+        });
         let verdict =
             |r: &Response| Verdict::from_wire(r.verdict).map_or("unknown answer", Verdict::text);
         board.answer = match &answer {

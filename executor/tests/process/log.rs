@@ -179,6 +179,8 @@ fn wrong_usage_is_told_with_its_own_code() {
         (["run", "--cpu", "99"], "--cpu 99: no such CPU can be used: "),
         (["run", "--cpu", "5000"], "are online, counted from 0"),
         (["run", "--stale-ms", "nan"], "--stale-ms must be a positive number"),
+        (["run", "--following-lag", "11"], "--following-lag must be from 0 to 10"),
+        (["run", "--min-rate", "1.5"], "--min-rate must be from 0 to 1"),
         (["run", "--arm", "middle"], "--arm takes right, left or BASE:TIP"),
     ] {
         let ended = command(&arguments, Stdio::piped()).output().unwrap();
