@@ -37,6 +37,7 @@
 
 mod fit;
 mod grid;
+mod thin;
 
 pub mod scan;
 

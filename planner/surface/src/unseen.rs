@@ -16,7 +16,7 @@ use crate::scan::{PlacedScan, Scan, View};
 const CELL: f64 = 0.01;
 /// A place counts as unseen from so far behind what was measured: so deep may the sensor be wrong,
 /// and so thin may a thing be. \[m\]
-pub const DEPTH: f64 = 0.02;
+const DEPTH: f64 = 0.02;
 /// How far the unseen is looked at around the surface. \[m\]
 const AROUND: f64 = 0.6;
 /// Directions are told apart by this angle, and by no less than a few measurements. \[rad\]

@@ -74,6 +74,15 @@ fn a_camera_finds_which_way_is_up_and_how_high_it_is() {
     let (raw, up) = seen(1);
     let told = level(&raw, Some(up), 1).unwrap();
     assert!((told.height - 1.3).abs() < 0.01);
+    // One that is a little wrong is taken at its word, and the plane's middle stays the support.
+    let aside = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.1) * up;
+    let told = level(&raw, Some(aside), 1).unwrap();
+    assert_eq!(told.up, aside);
+    let placement =
+        Placement::UpAndHeight { up: aside, sensor_height: told.height, support_height: 0.0 };
+    let (scan, _) = scan::place(&raw, &placement);
+    let near = |p: &&Point3<f64>| p.z.abs() < 0.02;
+    assert!(scan.views[0].points.iter().filter(near).count() > 100, "nothing is at the floor");
     let sideways = UnitVector3::new_normalize(Vector3::new(0.8, 0.0, 0.6));
     assert!(matches!(level(&raw, Some(sideways), 1), Err(LevelError::NoPlane { .. })));
 }

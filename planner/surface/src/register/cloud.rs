@@ -1,13 +1,12 @@
 //! A cloud as registration needs it.
 
-use std::collections::BTreeMap;
-
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3};
 use rayon::prelude::*;
 
 use crate::fit::{PlaneFit, weight};
 use crate::grid::Grid;
 use crate::scan::View;
+use crate::thin::thinned;
 
 /// How a cloud is thinned.
 #[derive(Clone, Copy)]
@@ -61,17 +60,6 @@ impl Cloud {
         let sided = views.iter().all(|view| view.sensor.is_some());
         Self { grid: Grid::new(&points, side), points, normals, sided }
     }
-}
-
-fn thinned(points: &[Point3<f64>], voxel: f64) -> Vec<Point3<f64>> {
-    let mut cells = BTreeMap::new();
-    for point in points {
-        let key = [0, 1, 2].map(|axis| (point[axis] / voxel).floor() as i64);
-        let cell: &mut (Vector3<f64>, f64) = cells.entry(key).or_insert((Vector3::zeros(), 0.0));
-        cell.0 += point.coords;
-        cell.1 += 1.0;
-    }
-    cells.into_values().map(|(sum, count)| Point3::from(sum / count)).collect()
 }
 
 /// The normal at a point; none where its neighbours are no surface.

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::fit::{PlaneFit, weight};
 use crate::grid::Grid;
+use crate::thin::thinned;
 
 /// How far a sensor's points stray from a plane.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,21 +65,14 @@ pub(super) fn thin(points: &[Point3<f64>]) -> (Vec<Point3<f64>>, f64) {
     };
     let (lower, upper) = points.iter().fold((infinite, -infinite), grow);
     let side = ((upper - lower).norm() / ACROSS).clamp(0.005, 0.03);
-    let mut cells: BTreeMap<[i64; 3], (Vector3<f64>, f64)> = BTreeMap::new();
-    for point in points {
-        let key = [0, 1, 2].map(|axis| (point[axis] / side).floor() as i64);
-        let cell = cells.entry(key).or_insert((Vector3::zeros(), 0.0));
-        cell.0 += point.coords;
-        cell.1 += 1.0;
-    }
-    (cells.into_values().map(|(sum, count)| Point3::from(sum / count)).collect(), side)
+    (thinned(points, side), side)
 }
 
-/// The flat pieces of a cloud, in the order in which they were found.
-pub(super) fn find(points: &[Point3<f64>], noise: &Noise, seed: u64) -> Vec<Flat> {
-    let (points, side) = thin(points);
+/// The flat pieces of a thinned cloud with its side, see [`thin`], in the order in which they were
+/// found.
+pub(super) fn find(points: &[Point3<f64>], side: f64, noise: &Noise, seed: u64) -> Vec<Flat> {
     let radius = 3.5 * side;
-    let grid = Grid::new(&points, radius);
+    let grid = Grid::new(points, radius);
     let normals: Vec<Option<UnitVector3<f64>>> =
         points.par_iter().map(|p| normal(p, &grid, radius)).collect();
     let mut free: Vec<usize> = (0..points.len()).filter(|&i| normals[i].is_some()).collect();
@@ -115,7 +109,7 @@ pub(super) fn find(points: &[Point3<f64>], noise: &Noise, seed: u64) -> Vec<Flat
             (point, turn) = (plane.centroid, Some(plane.normal));
         }
         let Some(normal) = turn else { break };
-        let (part, area) = largest_part(&points, &inliers, &normal);
+        let (part, area) = largest_part(points, &inliers, &normal);
         if area < AREA {
             failed += 1;
             // What makes no piece this time is not tried again.

@@ -9,7 +9,7 @@ use crate::scan::RawScan;
 /// Gravity as a scan shows it, in the file's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
-    /// Against gravity.
+    /// Against gravity: as it is given, or else the plane's normal.
     pub up: UnitVector3<f64>,
     /// Of the file's origin above the plane by which it was found. \[m\]
     pub height: f64,
@@ -54,8 +54,8 @@ const BELOW: f64 = 0.03;
 pub fn level(raw: &RawScan, up: Option<UnitVector3<f64>>, seed: u64) -> Result<Level, LevelError> {
     let view = field_of_view(&raw.points);
     let noise = Noise { sensors: view.map(|_| Point3::origin()).into_iter().collect() };
-    let flats = flat::find(&raw.points, &noise, seed);
-    let (thin, _) = flat::thin(&raw.points);
+    let (thin, side) = flat::thin(&raw.points);
+    let flats = flat::find(&thin, side, &noise, seed);
     let held = up.or(view).unwrap_or(Vector3::z_axis());
     let limit = if up.is_some() { GIVEN } else { TILT }.cos();
     let upwards = |flat: &Flat| {
@@ -74,9 +74,11 @@ pub fn level(raw: &RawScan, up: Option<UnitVector3<f64>>, seed: u64) -> Result<L
         a.1.area.total_cmp(&b.1.area)
     };
     let found = level.iter().filter(lowest).max_by(larger).or(level.iter().max_by(larger));
-    let Some((up, flat)) = found else { return Err(LevelError::NoPlane { least: AREA }) };
-    let height = -flat.centroid.coords.dot(up);
-    Ok(Level { up: *up, height, area: flat.area, camera: view.is_some() })
+    let Some((normal, flat)) = found else { return Err(LevelError::NoPlane { least: AREA }) };
+    // Who says the direction says it exactly; the plane gives the height along it.
+    let up = up.unwrap_or(*normal);
+    let height = -flat.centroid.coords.dot(&up);
+    Ok(Level { up, height, area: flat.area, camera: view.is_some() })
 }
 
 /// The direction up of a camera that is held level, if all points lie in the field of view of one at

@@ -49,8 +49,9 @@ impl Room {
             scan.views.iter().flat_map(|view| view.points.iter().copied()).collect();
         let sensors: Vec<Point3<f64>> = scan.views.iter().filter_map(|view| view.sensor).collect();
         let noise = Noise { sensors };
-        let flats = flat::find(&points, &noise, seed);
-        let planes = kinds(&flats, &flat::thin(&points).0);
+        let (thin, side) = flat::thin(&points);
+        let flats = flat::find(&thin, side, &noise, seed);
+        let planes = kinds(&flats, &thin);
         let segments = segment::find(scan, &planes, &noise);
         Self { planes, segments, noise }
     }

@@ -36,9 +36,7 @@ impl Plane {
     pub fn rectangle(&self) -> Rectangle {
         Rectangle::around(&self.outline, &self.point, &self.normal)
     }
-}
 
-impl Plane {
     /// Whether a point lies in the plane to within a tolerance, inside the outline unless it is the
     /// floor, which goes on.
     pub(super) fn holds(&self, point: &Point3<f64>, tolerance: f64) -> bool {

@@ -10,7 +10,7 @@ struct Foreign {
     convert: &'static str,
 }
 
-const FOREIGN: [Foreign; 8] = [
+const FOREIGN: [Foreign; 9] = [
     Foreign {
         name: "LAS/LAZ",
         extensions: &["las", "laz"],
@@ -32,14 +32,16 @@ const FOREIGN: [Foreign; 8] = [
     Foreign {
         name: "3MF",
         extensions: &["3mf"],
-        begins: b"PK\x03\x04",
+        // It is a zip file, as much else is.
+        begins: b"",
         convert: "assimp export FILE out.stl",
     },
     Foreign {
         name: "NumPy",
-        extensions: &["npy", "npz"],
+        extensions: &["npy"],
         begins: b"\x93NUMPY",
-        convert: "python3 -c \"import numpy as n; n.savetxt('out.xyz', n.load('FILE').reshape(-1, 3))\"",
+        convert: "python3 -c \"import numpy as n; a = n.load('FILE'); \
+                  n.savetxt('out.xyz', a.reshape(-1, a.shape[-1])[:, :3])\"",
     },
     Foreign {
         name: "PTX",
@@ -54,10 +56,17 @@ const FOREIGN: [Foreign; 8] = [
         convert: "assimp export FILE out.ply",
     },
     Foreign {
-        name: "ROS bag",
-        extensions: &["bag", "mcap", "db3"],
+        name: "ROS 1 bag",
+        extensions: &["bag"],
         begins: b"#ROSBAG",
-        convert: "ros2 run pcl_ros bag_to_pcd FILE TOPIC .",
+        convert: "rosrun pcl_ros bag_to_pcd FILE TOPIC .",
+    },
+    Foreign {
+        name: "ROS 2 bag",
+        extensions: &["mcap", "db3"],
+        begins: b"",
+        convert: "ros2 run pcl_ros bag_to_pcd --ros-args -p bag_path:=FILE -p topic_name:=TOPIC -p \
+                  output_directory:=.",
     },
 ];
 

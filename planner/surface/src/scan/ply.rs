@@ -75,6 +75,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
         Encoding::Ascii => lines.place(),
         _ => Place::Byte(bytes.len()),
     };
+    let left = match header.encoding {
+        Encoding::Ascii => lines.left(),
+        _ => {
+            let rest = source.trim_ascii();
+            (!rest.is_empty()).then(|| Place::Byte(bytes.len() - source.len()))
+        }
+    };
+    if let Some(place) = left {
+        parsed.warnings.push(ScanWarning::TrailingData { place });
+    }
     // Only now, as faces may stand before the vertices.
     let count = parsed.points.len();
     if let Some(corner) = parsed.triangles.iter().flatten().find(|&&corner| corner >= count) {

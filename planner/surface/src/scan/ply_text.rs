@@ -29,6 +29,12 @@ impl<'a> Body<'a> {
         Place::Line(self.line)
     }
 
+    /// Where the first line stands that no element has taken, if it has anything.
+    pub(super) fn left(&self) -> Option<Place> {
+        let more = self.lines.clone().position(|line| !line.trim().is_empty())?;
+        Some(Place::Line(self.line + more + 1))
+    }
+
     /// The next element. Values after it are ignored if it stands on one line; if it does not, they
     /// say that values are missing somewhere.
     pub(super) fn element<E: PropertyAccess>(

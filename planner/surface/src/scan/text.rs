@@ -253,5 +253,8 @@ fn count_of(line: &str) -> Option<usize> {
 
 fn no_names<T>(index: usize, line: &str) -> Result<T, Malformed> {
     let names: String = line.trim().chars().take(80).collect();
-    malformed(Place::Line(index + 1), format!("no columns x, y, z are named in {names:?}"))
+    malformed(
+        Place::Line(index + 1),
+        format!("no columns x, y, z are named in {names:?}: name them so in this line"),
+    )
 }
