@@ -210,9 +210,11 @@ impl Whole {
                 point(&q, curved.then_some(&v), k.time as u64 + lead)
             })
             .collect();
+        let waited = now_ns().saturating_sub(id.epoch) as f64 * 1e-9;
+        let told = Rejection::new(Reason::None).value(waited, plan.duration() * 1e-9);
         let running = Running { goal: goal.goal_id.id.clone(), plan, start_ns, started: false };
         link.orders.send(Order::Goal(Box::new(goal)))?;
-        self.tell(id, EventKind::Accepted, Rejection::new(Reason::None))?;
+        self.tell(id, EventKind::Accepted, told)?;
         if let Some(old) = self.running.replace(running) {
             self.tell(old.plan.id(), EventKind::Superseded, Rejection::new(Reason::None))?;
         }

@@ -55,9 +55,6 @@ fn scan(error: &ScanError) -> Option<String> {
         ScanError::NoSurface { .. } => {
             "--scale takes the file's unit to metres: 0.001 for millimetres"
         }
-        ScanError::Malformed { cause, .. } if cause.contains("columns x, y, z are named") => {
-            "name the columns x, y, z in the file's first line"
-        }
         _ => return None,
     };
     Some(text.into())

@@ -10,14 +10,16 @@ use nullsweep_gtsp::{
 };
 use serde::Serialize;
 
+use crate::numbers::{positive, seconds};
+
 /// Solve a generalized travelling-salesman instance (GTSPLIB or TSPLIB file).
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct GtspArgs {
     /// Instance file.
     file: PathBuf,
     /// Wall-clock limit in seconds; 10 where neither it nor --trials is given.
-    #[arg(long)]
-    seconds: Option<f64>,
+    #[arg(long, value_parser = limit)]
+    seconds: Option<Duration>,
     /// Limit in trials: the result then depends on the file, the seed and this number alone.
     #[arg(long)]
     trials: Option<u64>,
@@ -61,9 +63,6 @@ pub(super) enum GtspCliError {
         /// What is wrong with it.
         source: TsplibError,
     },
-    /// A limit that makes no sense.
-    #[error("--seconds {0}: give a positive number of seconds")]
-    Seconds(f64),
     /// The search did not start.
     #[error(transparent)]
     Solve(#[from] SolveError),
@@ -100,10 +99,10 @@ pub(super) fn run(args: &GtspArgs, out: &mut dyn Write) -> Result<(), GtspCliErr
     let started = Instant::now();
     let (tour, cost, trials, bound) = match args.method {
         Method::Search => {
-            let solution = solve(&file.instance, &budget(args)?, args.seed)?;
+            let solution = solve(&file.instance, &budget(args), args.seed)?;
             (solution.tour, solution.cost, solution.trials, solution.lower_bound)
         }
-        Method::Transformed => transformed(&file.instance, &budget(args)?, args.seed),
+        Method::Transformed => transformed(&file.instance, &budget(args), args.seed),
     };
     let value = cost.total();
     let numbers = file.tour_numbers(&tour);
@@ -164,16 +163,18 @@ fn summary(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out)
 }
 
-fn budget(args: &GtspArgs) -> Result<Budget, GtspCliError> {
+/// A limit of time that lets a search begin.
+fn limit(text: &str) -> Result<Duration, String> {
+    positive(text)?;
+    seconds(text)
+}
+
+fn budget(args: &GtspArgs) -> Budget {
     let time = match (args.seconds, args.trials) {
         (None, Some(_)) => None,
-        (seconds, _) => {
-            let seconds = seconds.unwrap_or(10.0);
-            let time = Duration::try_from_secs_f64(seconds).ok().filter(|t| !t.is_zero());
-            Some(time.ok_or(GtspCliError::Seconds(seconds))?)
-        }
+        (seconds, _) => Some(seconds.unwrap_or(Duration::from_secs(10))),
     };
-    Ok(Budget { trials: args.trials, time, threads: args.threads, target: args.best })
+    Budget { trials: args.trials, time, threads: args.threads, target: args.best }
 }
 
 fn transformed(

@@ -31,6 +31,9 @@ struct Summary {
     method: String,
     cost: String,
     seed: u64,
+    /// Whether it is as it was verified; if not, why.
+    verified: bool,
+    unverified_because: Option<String>,
     knots: usize,
     knots_on_surface: usize,
     patches_visited: usize,
@@ -77,6 +80,8 @@ fn summarise(plan: &Plan) -> Summary {
         method: format!("{:?}", plan.method),
         cost: format!("{:?}", plan.cost),
         seed: plan.seed,
+        verified: plan.check_seal().is_ok(),
+        unverified_because: plan.check_seal().err().map(|why| why.to_string()),
         knots: plan.knots.len(),
         knots_on_surface: plan.knots.iter().filter(|k| k.line.is_some()).count(),
         patches_visited: plan.knots.iter().filter(|k| k.patch.is_some()).count(),
@@ -97,6 +102,7 @@ fn tables(s: &Summary) -> String {
         &format!("{:.3} {:.3} {:.3}", s.base[0], s.base[1], s.base[2]),
     ]);
     plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
+    plan.add_row(["verified", s.unverified_because.as_deref().map_or("yes", |why| why)]);
     plan.add_row(["knots (on the surface)", &format!("{} ({})", s.knots, s.knots_on_surface)]);
     plan.add_row(["patches visited", &s.patches_visited.to_string()]);
     plan.add_row(["duration", &format!("{:.2} s", s.duration_s)]);

@@ -3,18 +3,16 @@
 use std::str::FromStr;
 
 use anyhow::bail;
-use nalgebra::{Point3, Translation3, UnitVector3, Vector3};
+use nalgebra::{Point3, Translation3, Vector3};
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_robot::Geometry;
-use nullsweep_surface::room::{self, Level, Plane, PlaneKind, Room};
-use nullsweep_surface::{CleanConfig, PlacedScan, RawScan, scan};
+use nullsweep_surface::room::{Plane, PlaneKind, Room};
+use nullsweep_surface::{CleanConfig, PlacedScan, scan};
 
 use crate::bars::Bars;
-
-/// Thickness of a table top. [m]
-pub(super) const TABLE_TOP: f64 = 0.03;
+use crate::table::TABLE_TOP;
 
 /// A level plane this near to height 0 is the floor that every scene has. [m]
 const FLOOR: f64 = 0.08;
@@ -39,17 +37,6 @@ impl FromStr for ObjectChoice {
             Err(_) => Err("a number or `largest` is wanted".into()),
         }
     }
-}
-
-/// Gravity by a scan's largest level plane.
-pub(super) fn level(
-    raw: &RawScan,
-    up: Option<UnitVector3<f64>>,
-    seed: u64,
-) -> anyhow::Result<Level> {
-    let found = room::level(raw, up, seed)?;
-    // Who says the direction says it exactly; the plane gives the height.
-    Ok(Level { up: up.unwrap_or(found.up), ..found })
 }
 
 /// The chosen object as the surface to sweep; all else that was scanned is in the way, floor, tables

@@ -1,6 +1,6 @@
 //! `planner scene`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
@@ -15,8 +15,8 @@ use serde::Serialize;
 
 use crate::bars::Bars;
 use crate::exit::OK;
+use crate::placed::{Gravity, PlacedArgs, read_scans};
 use crate::room::name;
-use crate::scene::{Gravity, SceneArgs, read_scans};
 
 #[derive(Debug, Args)]
 pub(super) struct SceneCommandArgs {
@@ -24,7 +24,7 @@ pub(super) struct SceneCommandArgs {
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]
-    scene: SceneArgs,
+    placed: PlacedArgs,
     /// Seed of every random choice: the same seed finds the same planes and objects.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -39,7 +39,7 @@ pub(super) struct SceneCommandArgs {
 pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
     bars.stage("scan", None);
-    let scan = read_scans(&args.scene, &args.scans, args.seed, Gravity::Found, &bars)?;
+    let scan = read_scans(&args.placed, &args.scans, args.seed, Gravity::Found, &bars)?;
     bars.stage("planes and objects", None);
     let room = Room::find(&scan, args.seed);
     bars.clear();
@@ -170,8 +170,7 @@ fn picture(scans: &[PathBuf], scan: &PlacedScan, room: &Room, rows: Vec<Vec<Stri
     let outline = |(i, plane): (usize, &nullsweep_surface::room::Plane)| {
         (format!("plane {}: {}", i + 1, name(plane.kind)), plane.outline.clone())
     };
-    let files: Vec<String> =
-        scans.iter().map(|path| Path::new(path).display().to_string()).collect();
+    let files: Vec<String> = scans.iter().map(|path| path.display().to_string()).collect();
     RoomData {
         title: "Nullsweep scene".into(),
         subtitle: files.join(", "),

@@ -13,7 +13,7 @@ use nullsweep_planner::task::{self, TaskConfig, TaskFigures, Tolerance};
 use crate::bars::Bars;
 use crate::exit::OK;
 use crate::json::write_json;
-use crate::numbers::velocity;
+use crate::numbers::{finite, velocity};
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 
@@ -33,7 +33,7 @@ pub(super) struct TaskArgs {
     tolerance: Tolerance,
     /// Height of the floor in the robot's root frame; without it 0, or just under the lowest pose
     /// where that is lower. [m]
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = finite)]
     floor: Option<f64>,
     /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
     #[arg(long, value_parser = velocity)]
@@ -117,7 +117,7 @@ fn table(f: &TaskFigures) -> Table {
         ["task time".to_owned(), format!("{:.2} s", f.task_time_s)],
         ["beyond the tolerance, max".to_owned(), format!("{:.1e}", f.excess_max)],
         ["edge deviation, p90, max".to_owned(), deviation],
-        ["violations".to_owned(), f.violations.to_string()],
+        ["violations, against itself and the floor".to_owned(), f.violations.to_string()],
         ["calculation".to_owned(), format!("{:.2} s", f.calc_time_s)],
         ["verification".to_owned(), format!("{:.2} s", f.verify_time_s)],
     ]);

@@ -22,5 +22,6 @@ pub(crate) fn run(bytes: &[u8]) -> bool {
     }
     let mut text = Vec::new();
     export(&file.instance, "again", &mut text).expect("memory takes it");
+    parse_gtsp(&text).expect("what was written can be read");
     true
 }

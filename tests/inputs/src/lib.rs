@@ -1,4 +1,4 @@
-//! Every untrusted input of Nullsweep as a function of bytes.
+//! Untrusted inputs of Nullsweep as functions of bytes. The meshes of links are not among them.
 //!
 //! A [`Target`] takes any bytes and gives them to the very function that would meet them: it never
 //! panics, always ends, and says whether they were taken. The fuzzer runs it (`fuzz/`), and so does a

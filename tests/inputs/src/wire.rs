@@ -1,6 +1,6 @@
 //! Plans as they come over the wire: admission, and the loop in virtual time with all that may
 //! happen around it. Whatever comes, the setpoints go on, none is farther from the last than the
-//! joint's velocity allows, and each plan has one admission and at most one end.
+//! joint's velocity allows, and no plan has more ends than admissions.
 //!
 //! The bytes: a count of deeds (two bytes each, and one for the cycles before it), the deeds, then
 //! headers each with its knots. A header with checksum 0 is sealed first.
@@ -20,7 +20,7 @@ use nullsweep_robot::JointVector;
 use crate::arm::arm;
 use crate::script::{Deed, deed};
 
-/// The least deeds of a script are none, the most these.
+/// A script has fewer deeds than this.
 const DEEDS: usize = 32;
 /// Bytes of a deed, with the cycles before it.
 const DEED: usize = 3;
