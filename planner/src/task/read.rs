@@ -55,7 +55,8 @@ const EXACT: f64 = 1e-3;
 /// Reads poses of the tool in the robot's root frame from text, its numbers apart by commas,
 /// semicolons, tabs or blanks: seven a line (position \[m\], unit quaternion x, y, z, w), or eight
 /// with a time before them, which is not looked at. Names in a line before the poses, or in a
-/// comment there, decide which column is which. A quaternion whose length is within 2 % of 1 is
+/// comment there, decide which column is which, and a position in another unit
+/// than metres is refused. A quaternion whose length is within 2 % of 1 is
 /// normalised, which is noted.
 ///
 /// # Errors
@@ -70,14 +71,17 @@ pub fn read(path: &Path) -> Result<Poses, PosesError> {
     for (k, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let comment = ["#", "//", "%"].iter().any(|mark| line.trim_start().starts_with(mark));
         let cells = cells(line.trim_start_matches(['#', '/', '%', ' ']));
+        let at = |what| PosesError::Line { path: path.into(), line: k + 1, what };
         let heading = poses.is_empty() && cells.iter().all(|cell| cell.parse::<f64>().is_err());
         if cells.is_empty() || comment || heading {
-            if poses.is_empty() {
-                columns = named(&cells).or(columns);
+            if poses.is_empty()
+                && let Some(named) = named(&cells)
+            {
+                in_metres(&cells, &named).map_err(at)?;
+                columns = Some(named);
             }
             continue;
         }
-        let at = |what| PosesError::Line { path: path.into(), line: k + 1, what };
         let (pose, length) = pose(&cells, columns).map_err(at)?;
         let off = (length - 1.0).abs();
         if off > EXACT {
@@ -134,6 +138,18 @@ fn named(names: &[&str]) -> Option<[usize; 7]> {
         *column = names.iter().position(|name| wanted.contains(&name.as_str()))?;
     }
     Some(columns)
+}
+
+/// Refuses a position that its column's name says to be in another unit than metres.
+fn in_metres(names: &[&str], columns: &[usize; 7]) -> Result<(), String> {
+    for name in columns[..3].iter().filter_map(|&column| names.get(column)) {
+        let unit = name.split_once(['[', '(']).map_or("", |(_, unit)| unit);
+        let unit = unit.trim_matches(|c: char| !c.is_alphanumeric()).to_lowercase();
+        if !["", "m", "metre", "metres", "meter", "meters"].contains(&unit.as_str()) {
+            return Err(format!("column `{name}` is in {unit}: give metres"));
+        }
+    }
+    Ok(())
 }
 
 /// The pose in a line and the length of its quaternion as it is there.
@@ -228,6 +244,7 @@ mod tests {
             ("0,1,2,3,0,0,0,2", 1),
             ("1,2,3,0,0,0,nan", 1),
             ("h\n1,2,3,0,0,0,x", 2),
+            ("# poses\nx [mm],y [mm],z [mm],qx,qy,qz,qw\n1000,0,0,0,0,0,1", 2),
         ] {
             match read_text(text) {
                 Err(PosesError::Line { line: found, .. }) => assert_eq!(found, line, "{text}"),

@@ -208,17 +208,18 @@ mod tests {
         let tool = Tool::default();
         let bed = Bed::new(&ridge(0.013), &tool);
         // 13 mm press on a pad that gives way by 10.
-        assert!(
-            (bed.lift(&flat(0.04), 0.0) - 0.0035).abs() < 1e-4,
-            "{}",
-            bed.lift(&flat(0.04), 0.0)
-        );
+        let lift = bed.lift(&flat(0.04), 0.0);
+        assert!((lift - 0.0035).abs() < 1e-4, "{lift}");
         assert_eq!(bed.lift(&flat(0.15), 0.0), 0.0);
         let bed = Bed::new(&ridge(0.009), &tool);
         assert_eq!(bed.lift(&flat(0.04), 0.0), 0.0);
-        // A wall is not lain on.
-        let bed = Bed::new(&ridge(0.2), &tool);
-        assert!(bed.lift(&flat(0.09), 0.0) <= HIGHEST);
+        // A thing that stands higher is not lain on, and no farther is the pad raised.
+        for (height, lift) in [(0.012, 0.0025), (0.024, HIGHEST), (0.03, 0.0)] {
+            let mut thing = ridge(0.0);
+            thing.surroundings.push(Point3::new(0.15, 0.0, height));
+            let found = Bed::new(&thing, &tool).lift(&flat(0.13), 0.0);
+            assert!((found - lift).abs() < 1e-9, "{height} m: {found}");
+        }
     }
 
     #[test]

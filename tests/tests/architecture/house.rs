@@ -126,7 +126,7 @@ const COLLISION: &[&str] = &[
 ];
 
 const SURFACE: &[&str] =
-    &["grid", "fit", "scan", "simulate", "room", "register", "sheet", "patches", "unseen"];
+    &["grid", "thin", "fit", "scan", "simulate", "room", "register", "sheet", "patches", "unseen"];
 
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[
