@@ -59,7 +59,8 @@ pub fn run(
     let patches = clock.time("patches", || {
         let found = patches::find(surface, &job.patches, job.seed);
         let bed = Bed::new(scene, &job.tool);
-        found.into_par_iter().map(|patch| bed.raised(patch)).collect::<Vec<_>>()
+        let carried = found.into_par_iter().filter(|patch| bed.carries(patch));
+        carried.map(|patch| bed.raised(patch)).collect::<Vec<_>>()
     });
     if patches.is_empty() {
         return Err(PipelineError::NoPatches { points: surface.points.len() });

@@ -64,6 +64,13 @@ impl Bed {
         &self.surface
     }
 
+    /// Whether there is surface under the middle of a patch. On a sparse scan few points may make a
+    /// plane, and none of them be near its middle.
+    #[must_use]
+    pub fn carries(&self, patch: &Patch) -> bool {
+        self.surface.project(&patch.centre, &patch.normal).is_some()
+    }
+
     /// The patch as the pad comes to lie on it: where something presses it in too deep tilted so
     /// that this is least, then raised. Where the pad would not sweep the point under its centre, as
     /// that lies too aslant, that point's normal takes the place of the patch's.

@@ -144,6 +144,11 @@ fn a_mesh_without_a_sensor_has_outward_normals() {
         .collect();
     let share = level.iter().filter(|&&z| z > 0.0).count() as f64 / level.len() as f64;
     assert!(level.len() > 100 && share > 0.95, "{share:.2} of {} look up", level.len());
+    // No camera made it, so nothing flies: what is too thin for a surface is known too.
+    let known = Grid::new(&scan.points, 0.015);
+    let lost =
+        placed.views[0].points.iter().filter(|p| known.nearest(p, 0.015, |_| true).is_none());
+    assert_eq!(lost.count(), 0);
 }
 
 #[test]

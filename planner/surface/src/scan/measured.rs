@@ -8,7 +8,7 @@ use super::place::PlacedScan;
 use crate::grid::Grid;
 
 /// A point this near to a point of the surface is the surface, seen with the sensor's noise. \[m\]
-const STANDS_FOR: f64 = 0.015;
+pub(super) const STANDS_FOR: f64 = 0.015;
 /// A thing has at least this many points more …
 const COMPANY: usize = 3;
 /// … this near to each of its points, or four spacings of the surface; a pixel that flies alone
