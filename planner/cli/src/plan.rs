@@ -30,7 +30,7 @@ use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ.
+    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ; or one scene file that `planner scene` wrote.
     #[arg(required_unless_present = "demo", conflicts_with = "demo")]
     scans: Vec<PathBuf>,
     /// Plan for a simulated scan instead.
@@ -115,6 +115,9 @@ pub(super) struct PlanArgs {
     report: Option<PathBuf>,
 }
 
+/// What lies farther before a pad than this does not touch it. [m]
+const HOVERS: f64 = 0.003;
+
 #[derive(Clone, Copy, Debug)]
 enum Base {
     Auto,
@@ -175,6 +178,13 @@ pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8,
     bars.stage("scan", None);
     let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
     let job = job(args, &robot, after)?;
+    if job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
+        let hover = 1e3 * job.tool.hover();
+        bars.note(&format!(
+            "points up to {hover:.0} mm before the pad count as swept: its stand_off and reach_normal \
+             say so"
+        ));
+    }
     let outcome = pipeline::run(&robot, &scene, &job, &bars);
     bars.clear();
     let outcome = outcome?;
