@@ -210,7 +210,7 @@ mod tests {
             points: points.clone(),
             spacing: 0.004,
         };
-        (View { points, normals: None, sensor }, surface)
+        (View { points, sensor, ..View::default() }, surface)
     }
 
     #[test]

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{UnitVector3, Vector3};
 use nullsweep_surface::{
-    CleanConfig, PatchConfig, Placement, ReadOptions, Scan, ScanError, patches, scan, scan::Format,
-    scan::ScanWarning, simulate, simulate::SimulatedView,
+    CleanConfig, Grid, PatchConfig, Placement, ReadOptions, Scan, ScanError, patches, scan,
+    scan::Format, scan::ScanWarning, simulate, simulate::SimulatedView,
 };
 
 /// The test data, or `None` with the reason printed.

@@ -60,7 +60,7 @@ mod tests {
         let loose = Point3::new(0.07, 0.07, 0.56);
         let beside = loose + Vector3::x() * 1e-4;
         let points = plate.iter().copied().chain([loose, beside]).collect();
-        let view = View { points, normals: None, sensor: None };
+        let view = View { points, ..View::default() };
         let mut scan = PlacedScan { views: vec![view] };
         let joined = join(surface.clone(), &scan, 0.004);
         assert_eq!(joined.points[..900], surface.points);

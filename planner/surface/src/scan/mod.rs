@@ -16,6 +16,7 @@ mod crop;
 mod decode;
 mod error;
 mod foreign;
+mod inside;
 mod loose;
 mod measured;
 mod mesh;
