@@ -21,8 +21,9 @@ use crate::joints::JointVector;
 /// `reach_normal` of the plane that is `stand_off` ahead of the pad's, and faces the pad to within
 /// `reach_angle`. Wiping needs contact: of a pad that is pressed in (`stand_off` below 0) these two
 /// say how deep its soft body is pressed and how far before its plane it still touches, which is
-/// [`Tool::hover`]; a sponge pressed in by 4 mm with 6 mm of reach touches from 10 mm behind its plane
-/// to 2 mm before it, by which scans are uncertain. A tool that works from afar stands off.
+/// [`Tool::hover`]; a sponge pressed in by 4 mm with
+/// 8 mm of reach touches to 4 mm before its plane, which is what a depth camera is uncertain by two
+/// metres away. A tool that works from afar stands off.
 ///
 /// One that is read from a file has passed [`Tool::check`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,7 +79,7 @@ impl Default for Tool {
             stand_off: -0.004,
             press_max: 0.010,
             symmetric: true,
-            reach_normal: 0.006,
+            reach_normal: 0.008,
             reach_angle: 30f64.to_radians(),
         }
     }

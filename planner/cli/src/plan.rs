@@ -116,7 +116,7 @@ pub(super) struct PlanArgs {
 }
 
 /// What lies farther before a pad than this does not touch it. [m]
-const HOVERS: f64 = 0.003;
+const HOVERS: f64 = 0.005;
 
 #[derive(Clone, Copy, Debug)]
 enum Base {
@@ -277,6 +277,10 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     row("dropped patches", f.dropped_patches.to_string());
     row("knots", f.knots.to_string());
     rows.extend(verified_rows(v));
+    if !f.left_out.is_empty() {
+        rows.push(["not swept, by what is in the way".to_owned(), String::new()]);
+        rows.extend(f.left_out.iter().map(|left| [format!("  {}", left.cause), left.to_string()]));
+    }
     let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("calculation", format!("{:.2} s", f.calc_time_total_s));
     for (stage, seconds) in &f.calc_time_s {
