@@ -33,6 +33,8 @@ fn check(outcome: &Outcome) {
     assert!(v.coverage_reachable > 0.95, "reachable points: {}", v.coverage_reachable);
     assert!(v.line_deviation_max_m < 2e-4, "line: {}", v.line_deviation_max_m);
     assert!(v.scan_distance_p95_m < 0.006, "scan: {}", v.scan_distance_p95_m);
+    let left: f64 = outcome.figures.left_out.iter().map(|left| left.share).sum();
+    assert!((left + v.coverage_all - 1.0).abs() < 1e-9, "{left} + {}", v.coverage_all);
 }
 
 #[test]

@@ -270,10 +270,7 @@ fn a_scan_of_two_views_is_joined() {
         points: (0..2500)
             .map(|i| Point3::new(0.004 * f64::from(i % 50), 0.004 * f64::from(i / 50), 0.5 * sign))
             .collect(),
-        normals: None,
-        viewpoint: None,
-        dropped: 0,
-        warnings: Vec::new(),
+        ..RawScan::default()
     };
     // Two plates 5 mm apart, each seen from its own side: their normals must stay opposite.
     let mut placed =

@@ -17,6 +17,14 @@ use crate::joints::JointVector;
 /// the surface (against the surface normal) and y = z × x along the pad's long side, so that the
 /// pad moves across its long side (paper §I).
 ///
+/// **What is swept.** A point of the surface is swept where it lies in the pad's rectangle, within
+/// `reach_normal` of the plane that is `stand_off` ahead of the pad's, and faces the pad to within
+/// `reach_angle`. Wiping needs contact: of a pad that is pressed in (`stand_off` below 0) these two
+/// say how deep its soft body is pressed and how far before its plane it still touches, which is
+/// [`Tool::hover`]; a sponge pressed in by 4 mm with
+/// 8 mm of reach touches to 4 mm before its plane, which is what a depth camera is uncertain by two
+/// metres away. A tool that works from afar stands off.
+///
 /// One that is read from a file has passed [`Tool::check`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self", deny_unknown_fields)]
@@ -35,7 +43,8 @@ pub struct Tool {
     pub approach: [f64; 3],
     /// The tip frame's axis along the pad's long side.
     pub across: [f64; 3],
-    /// Distance kept between pad centre and surface, along the normal. \[m\]
+    /// Distance kept between pad centre and surface, along the normal; below 0 the pad is pressed in
+    /// so far. \[m\]
     pub stand_off: f64,
     /// How far the pad's soft body may be pressed in, along its axis, anywhere in its rectangle; a
     /// third of its thickness where a file does not say it. \[m\]
@@ -43,7 +52,7 @@ pub struct Tool {
     pub press_max: f64,
     /// Whether a heading and its opposite are the same contact.
     pub symmetric: bool,
-    /// A point is swept within this distance of the pad's plane. \[m\]
+    /// A point is swept within this distance of the plane `stand_off` ahead of the pad's. \[m\]
     pub reach_normal: f64,
     /// A point is swept if its normal is within this angle of the pad's. \[rad\]
     pub reach_angle: f64,
@@ -56,7 +65,8 @@ fn unsaid() -> f64 {
 
 impl Default for Tool {
     /// The sponge of 0.10 × 0.07 m in the PR2's gripper: pad centre 0.03 m ahead of the gripper's
-    /// tool frame along its x axis, which points into the surface.
+    /// tool frame along its x axis, which points into the surface. It is pressed in by 4 mm and gives
+    /// way by 10.
     fn default() -> Self {
         Self {
             name: "sponge".into(),
@@ -66,10 +76,10 @@ impl Default for Tool {
             centre: [0.03, 0.0, 0.0],
             approach: [1.0, 0.0, 0.0],
             across: [0.0, 1.0, 0.0],
-            stand_off: 0.0,
+            stand_off: -0.004,
             press_max: 0.010,
             symmetric: true,
-            reach_normal: 0.010,
+            reach_normal: 0.008,
             reach_angle: 30f64.to_radians(),
         }
     }
@@ -171,6 +181,12 @@ impl Tool {
             return Err(ToolError::Parallel { approach, across });
         }
         Ok(())
+    }
+
+    /// How far before the pad's plane a point may lie and be swept; 0 where it must be pressed in. \[m\]
+    #[must_use]
+    pub fn hover(&self) -> f64 {
+        (self.stand_off + self.reach_normal).max(0.0)
     }
 
     /// The pose of the contact frame in the arm's tip frame.

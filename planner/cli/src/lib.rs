@@ -20,6 +20,7 @@ mod robot;
 mod room;
 mod scene;
 mod scene_command;
+mod scene_file;
 mod table;
 mod task;
 mod verify;

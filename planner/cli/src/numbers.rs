@@ -3,6 +3,9 @@
 use std::str::FromStr;
 use std::time::Duration;
 
+use anyhow::Context;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+
 /// Any finite number.
 pub(super) fn finite(text: &str) -> Result<f64, String> {
     within(text, f64::is_finite, "a finite number is wanted")
@@ -33,6 +36,13 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
 fn within(text: &str, is_in: impl Fn(f64) -> bool, wanted: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|e| format!("{e}: {wanted}"))?;
     if is_in(value) { Ok(value) } else { Err(wanted.into()) }
+}
+
+/// A pose: x, y, z \[m\], qx, qy, qz, qw.
+pub(super) fn isometry(&[x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> anyhow::Result<Isometry3<f64>> {
+    let rotation = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6)
+        .context("the quaternion must not be zero")?;
+    Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
 }
 
 /// N comma-separated finite numbers.

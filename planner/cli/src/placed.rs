@@ -4,18 +4,19 @@ use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
 use clap::Args;
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, UnitVector3, Vector3};
 use nullsweep_planner::progress::Progress;
 use nullsweep_surface::room;
 use nullsweep_surface::{PlacedScan, Placement, RawScan, ReadOptions, scan};
 
 use crate::advice;
 use crate::bars::Bars;
-use crate::numbers::{Numbers, finite, not_negative, positive};
+use crate::numbers::{Numbers, finite, isometry, not_negative, positive};
+use crate::scene_file::SceneFile;
 use crate::views;
 
 /// How the scans stand.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct PlacedArgs {
     /// Pose of a scan's sensor in the floor frame: x,y,z,qx,qy,qz,qw; once for each scan.
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
@@ -34,7 +35,7 @@ pub(super) struct PlacedArgs {
     pub(super) support_height: f64,
     /// Factor from the file's unit to metres: 0.001 for millimetres.
     #[arg(long, default_value_t = 1.0, value_parser = positive)]
-    scale: f64,
+    pub(super) scale: f64,
 }
 
 /// Who says which way is up and how high the sensor is, where arguments leave it open.
@@ -46,14 +47,35 @@ pub(super) enum Gravity {
     Found,
 }
 
-/// Reads, places and joins the scans, with a note for all that had to be guessed.
+/// Scans in the floor frame.
+pub(super) struct Placed {
+    pub(super) scan: PlacedScan,
+    /// Of each file, what takes its coordinates there.
+    pub(super) poses: Vec<Isometry3<f64>>,
+    /// By which a scene file's planes and objects were found.
+    pub(super) seed: Option<u64>,
+}
+
+/// Reads, places and joins the scans, with a note for all that had to be guessed; or takes a scene
+/// file at its word.
 pub(super) fn read_scans(
     args: &PlacedArgs,
     scans: &[PathBuf],
     seed: u64,
     gravity: Gravity,
     bars: &Bars,
-) -> anyhow::Result<PlacedScan> {
+) -> anyhow::Result<Placed> {
+    if let [path] = scans
+        && path.extension().is_some_and(|extension| extension == "toml")
+    {
+        let given = args.up.is_some() || !args.sensor_pose.is_empty() || args.scale != 1.0;
+        ensure!(
+            !given,
+            "{}: a scene file says how its scans stand: leave out --up, --sensor-pose and --scale",
+            path.display()
+        );
+        return SceneFile::read(path);
+    }
     ensure!(
         args.sensor_pose.is_empty() || args.sensor_pose.len() == scans.len(),
         "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
@@ -75,13 +97,15 @@ pub(super) fn read_scans(
         // All files share the frame of the first one.
         shared = Some(together(args, &files, seed, gravity, bars)?);
     }
-    let mut joined = PlacedScan::default();
+    let (mut joined, mut poses) = (PlacedScan::default(), Vec::with_capacity(files.len()));
     for (i, (path, raw)) in files.into_iter().enumerate() {
         let placement = match &shared {
             Some(shared) => shared.clone(),
-            None => Placement::SensorPose(isometry(&args.sensor_pose[i])?),
+            None => {
+                Placement::SensorPose(isometry(&args.sensor_pose[i].0).context("--sensor-pose")?)
+            }
         };
-        let (mut placed, _) = scan::place(&raw, &placement);
+        let (mut placed, mut pose) = scan::place(&raw, &placement);
         // A file with normals is a model or has been through a program that laid it in place.
         if i > 0 && !args.as_placed {
             if raw.normals.is_some() {
@@ -91,12 +115,13 @@ pub(super) fn read_scans(
                     path.display()
                 ));
             } else {
-                views::lay(&joined, &mut placed, path, bars)?;
+                pose = views::lay(&joined, &mut placed, path, bars)? * pose;
             }
         }
         joined.join(placed);
+        poses.push(pose);
     }
-    Ok(joined)
+    Ok(Placed { scan: joined, poses, seed: None })
 }
 
 /// The one placement of files that share a frame.
@@ -170,10 +195,4 @@ fn upright(args: &PlacedArgs) -> anyhow::Result<Placement> {
         }
         None => Placement::Up { up, support_height: args.support_height },
     })
-}
-
-fn isometry(&Numbers([x, y, z, qx, qy, qz, qw]): &Numbers<7>) -> anyhow::Result<Isometry3<f64>> {
-    let rotation = UnitQuaternion::try_new(Quaternion::new(qw, qx, qy, qz), 1e-6)
-        .context("--sensor-pose: the quaternion must not be zero")?;
-    Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
 }

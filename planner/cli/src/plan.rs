@@ -30,7 +30,7 @@ use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ.
+    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ; or one scene file that `planner scene` wrote.
     #[arg(required_unless_present = "demo", conflicts_with = "demo")]
     scans: Vec<PathBuf>,
     /// Plan for a simulated scan instead.
@@ -115,6 +115,9 @@ pub(super) struct PlanArgs {
     report: Option<PathBuf>,
 }
 
+/// What lies farther before a pad than this does not touch it. [m]
+const HOVERS: f64 = 0.005;
+
 #[derive(Clone, Copy, Debug)]
 enum Base {
     Auto,
@@ -175,6 +178,13 @@ pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8,
     bars.stage("scan", None);
     let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
     let job = job(args, &robot, after)?;
+    if job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
+        let hover = 1e3 * job.tool.hover();
+        bars.note(&format!(
+            "points up to {hover:.0} mm before the pad count as swept: its stand_off and reach_normal \
+             say so"
+        ));
+    }
     let outcome = pipeline::run(&robot, &scene, &job, &bars);
     bars.clear();
     let outcome = outcome?;
@@ -267,6 +277,10 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     row("dropped patches", f.dropped_patches.to_string());
     row("knots", f.knots.to_string());
     rows.extend(verified_rows(v));
+    if !f.left_out.is_empty() {
+        rows.push(["not swept, by what is in the way".to_owned(), String::new()]);
+        rows.extend(f.left_out.iter().map(|left| [format!("  {}", left.cause), left.to_string()]));
+    }
     let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("calculation", format!("{:.2} s", f.calc_time_total_s));
     for (stage, seconds) in &f.calc_time_s {

@@ -2,28 +2,41 @@
 
 use std::str::FromStr;
 
-use anyhow::bail;
+use anyhow::{Context, ensure};
 use nalgebra::{Point3, Translation3, Vector3};
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_robot::Geometry;
-use nullsweep_surface::room::{Plane, PlaneKind, Room};
+use nullsweep_surface::room::{Plane, PlaneKind, Room, Segment};
 use nullsweep_surface::{CleanConfig, PlacedScan, scan};
 
 use crate::bars::Bars;
+use crate::numbers::Numbers;
+use crate::placed::Placed;
 use crate::table::TABLE_TOP;
 
 /// A level plane this near to height 0 is the floor that every scene has. [m]
 const FLOOR: f64 = 0.08;
 
+/// Seed by which planes and objects are found where nothing else says it: `planner plan` is to number
+/// them as `planner scene` has.
+pub(super) const SEED: u64 = 1;
+
+/// Farthest that an object may be from a point that is to name it. [m]
+const BESIDE: f64 = 0.05;
+
 /// Which object of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ObjectChoice {
     /// The one with the most points.
     Largest,
+    /// Of those on tables.
+    LargestOnTable,
     /// By its number, from 1 on.
     Number(usize),
+    /// The one at this point of the floor frame. [m]
+    At(Point3<f64>),
 }
 
 impl FromStr for ObjectChoice {
@@ -34,7 +47,13 @@ impl FromStr for ObjectChoice {
             Ok(0) => Err("objects are numbered from 1 on".into()),
             Ok(number) => Ok(Self::Number(number)),
             Err(_) if text == "largest" => Ok(Self::Largest),
-            Err(_) => Err("a number or `largest` is wanted".into()),
+            Err(_) if text == "largest-on-table" => Ok(Self::LargestOnTable),
+            Err(_) => match Numbers::<3>::from_str(text) {
+                Ok(Numbers(point)) => Ok(Self::At(point.into())),
+                Err(_) => {
+                    Err("a number, a point X,Y,Z, `largest` or `largest-on-table` is wanted".into())
+                }
+            },
         }
     }
 }
@@ -42,27 +61,21 @@ impl FromStr for ObjectChoice {
 /// The chosen object as the surface to sweep; all else that was scanned is in the way, floor, tables
 /// and walls as far as they were seen. Second, the flying pixels.
 pub(super) fn object(
-    scan: &PlacedScan,
+    placed: &Placed,
     choice: ObjectChoice,
-    seed: u64,
     bars: &Bars,
 ) -> anyhow::Result<(Scene, Vec<Point3<f64>>)> {
-    let room = Room::find(scan, seed);
+    let scan = &placed.scan;
+    let room = Room::find(scan, placed.seed.unwrap_or(SEED));
     let count = room.segments.len();
-    let index = match choice {
-        ObjectChoice::Largest => 0,
-        ObjectChoice::Number(number) => number - 1,
-    };
-    let Some(segment) = room.segments.get(index) else {
-        if count == 0 {
-            bail!(
-                "no object stands on the {} planes of the scene: look with `planner scene`, or cut \
-                 out with --crop what is to be swept",
-                room.planes.len()
-            );
-        }
-        bail!("there is no object {}: `planner scene` shows {count}", index + 1);
-    };
+    ensure!(
+        count > 0,
+        "no object stands on the {} planes of the scene: look with `planner scene`, or cut out with \
+         --crop what is to be swept",
+        room.planes.len()
+    );
+    let index = chosen(scan, &room, choice)?;
+    let segment = &room.segments[index];
     let (low, high) = (segment.bounds.min, segment.bounds.max);
     bars.note(&format!(
         "object {} of {count}: {} points from {low:.2} to {high:.2} m, on the {}; {} planes are \
@@ -77,6 +90,37 @@ pub(super) fn object(
     scene.surroundings.retain(|point| !room.is_on_plane(point));
     scene.obstacles.extend(room.planes.iter().filter_map(obstacle));
     Ok((scene, flying))
+}
+
+/// The index of the object that is chosen.
+fn chosen(scan: &PlacedScan, room: &Room, choice: ObjectChoice) -> anyhow::Result<usize> {
+    let (segments, count) = (&room.segments, room.segments.len());
+    match choice {
+        ObjectChoice::Largest => Ok(0),
+        ObjectChoice::LargestOnTable => {
+            let on_table = |s: &Segment| room.planes[s.stands_on].kind == PlaneKind::Table;
+            segments.iter().position(on_table).context("no object stands on a table")
+        }
+        ObjectChoice::Number(number) => {
+            ensure!(number <= count, "there is no object {number}: `planner scene` shows {count}");
+            Ok(number - 1)
+        }
+        ObjectChoice::At(point) => {
+            let distance = |segment: &Segment| {
+                let views = scan.views.iter().zip(&segment.members);
+                let points = views.flat_map(|(v, m)| m.iter().map(|&i| v.points[i as usize]));
+                points.map(|p| nalgebra::distance(&p, &point)).fold(f64::INFINITY, f64::min)
+            };
+            let near = segments.iter().map(distance).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+            let (index, apart) = near.context("no object is there")?;
+            ensure!(
+                apart <= BESIDE,
+                "no object is at {point:.3}: the nearest, object {}, is {apart:.2} m away",
+                index + 1
+            );
+            Ok(index)
+        }
+    }
 }
 
 /// What a plane is called.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::ensure;
 use clap::Args;
+use nalgebra::Point3;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_surface::{CleanConfig, CropBox, PlacedScan, Placement, scan, simulate};
@@ -14,7 +15,7 @@ use crate::room::{self, ObjectChoice};
 use crate::table::{self, TableSize};
 
 /// How the scans stand, what of them is swept, and what else is there.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct SceneArgs {
     #[command(flatten)]
     placed: PlacedArgs,
@@ -29,11 +30,20 @@ pub(super) struct SceneArgs {
     /// xmin,ymin,zmin,xmax,ymax,zmax.
     #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
     crop: Option<CropBox>,
-    /// Sweep only this object of the scene, by its number from `planner scene`, or the one with the
-    /// most points: N or `largest`. Without --up, --sensor-pose: gravity is found by the largest level
-    /// plane.
-    #[arg(long, value_name = "OBJECT", conflicts_with = "crop")]
+    /// Sweep only this object of the scene: by its number from `planner scene`, by a point of it
+    /// X,Y,Z, or the one with the most points, `largest` or `largest-on-table`. Without --up,
+    /// --sensor-pose: gravity is found by the largest level plane.
+    #[arg(long, value_name = "OBJECT", conflicts_with = "crop", allow_hyphen_values = true)]
     object: Option<ObjectChoice>,
+}
+
+impl SceneArgs {
+    /// The same, of an object at a point of the floor frame where nothing else is chosen.
+    pub(super) fn or_at(&self, point: Point3<f64>) -> Self {
+        let chosen = self.object.is_some() || self.crop.is_some();
+        let object = if chosen { self.object } else { Some(ObjectChoice::At(point)) };
+        Self { object, ..self.clone() }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -66,11 +76,11 @@ pub(super) fn scene(
     let (mut scene, flying) = if let Some(choice) = args.object {
         ensure!(demo.is_none(), "--object chooses from a scan, not from a demo");
         let placed = read_scans(&args.placed, scans, seed, Gravity::Found, bars)?;
-        room::object(&placed, choice, seed, bars)?
+        room::object(&placed, choice, bars)?
     } else {
         let (placed, region) = match demo {
             Some(demo) => simulated(demo, seed),
-            None => (read_scans(&args.placed, scans, seed, Gravity::Given, bars)?, None),
+            None => (read_scans(&args.placed, scans, seed, Gravity::Given, bars)?.scan, None),
         };
         let region = args.crop.or(region);
         Scene::seen(&placed, region.as_ref(), &CleanConfig::default())?

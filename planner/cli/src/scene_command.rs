@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
@@ -11,12 +10,12 @@ use nullsweep_planner::progress::Progress;
 use nullsweep_report::{self as report, RoomData};
 use nullsweep_surface::PlacedScan;
 use nullsweep_surface::room::Room;
-use serde::Serialize;
 
 use crate::bars::Bars;
 use crate::exit::OK;
 use crate::placed::{Gravity, PlacedArgs, read_scans};
-use crate::room::name;
+use crate::room::{SEED, name};
+use crate::scene_file::SceneFile;
 
 #[derive(Debug, Args)]
 pub(super) struct SceneCommandArgs {
@@ -26,9 +25,10 @@ pub(super) struct SceneCommandArgs {
     #[command(flatten)]
     placed: PlacedArgs,
     /// Seed of every random choice: the same seed finds the same planes and objects.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = SEED)]
     seed: u64,
-    /// Write planes and objects as TOML to a file.
+    /// Write where the scans stand, planes and objects as TOML to a file, which `planner plan` and
+    /// `planner verify` take in place of the scans.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write a page with a picture of planes and objects.
@@ -39,9 +39,10 @@ pub(super) struct SceneCommandArgs {
 pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
     bars.stage("scan", None);
-    let scan = read_scans(&args.placed, &args.scans, args.seed, Gravity::Found, &bars)?;
+    let found = read_scans(&args.placed, &args.scans, args.seed, Gravity::Found, &bars)?;
+    let scan = &found.scan;
     bars.stage("planes and objects", None);
-    let room = Room::find(&scan, args.seed);
+    let room = Room::find(scan, args.seed);
     bars.clear();
     let rows = rows(&room);
     let mut table = Table::new();
@@ -49,12 +50,11 @@ pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     table.add_rows(&rows);
     println!("{table}");
     if let Some(path) = &args.out {
-        let text = toml::to_string(&file(&args.scans, &scan, &room))?;
-        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        SceneFile::of(path, &args.placed, &args.scans, &found, &room, args.seed)?.write(path)?;
         println!("scene: {}", path.display());
     }
     if let Some(path) = &args.report {
-        report::write_room(path, &picture(&args.scans, &scan, &room, rows))?;
+        report::write_room(path, &picture(&args.scans, scan, &room, rows))?;
         println!("report: {}", path.display());
     }
     Ok(OK)
@@ -87,67 +87,6 @@ fn rows(room: &Room) -> Vec<Vec<String>> {
         ]
     });
     planes.chain(objects).collect()
-}
-
-/// A scene file: all in the floor frame, in metres.
-#[derive(Serialize)]
-struct SceneFile {
-    scan: Vec<ScanEntry>,
-    plane: Vec<PlaneEntry>,
-    object: Vec<ObjectEntry>,
-}
-
-#[derive(Serialize)]
-struct ScanEntry {
-    file: PathBuf,
-    points: usize,
-    /// Where its sensor stood, if that is known.
-    sensor: Option<[f64; 3]>,
-}
-
-#[derive(Serialize)]
-struct PlaneEntry {
-    number: usize,
-    kind: &'static str,
-    point: [f64; 3],
-    normal: [f64; 3],
-    area: f64,
-    outline: Vec<[f64; 3]>,
-}
-
-#[derive(Serialize)]
-struct ObjectEntry {
-    number: usize,
-    points: usize,
-    min: [f64; 3],
-    max: [f64; 3],
-    centre: [f64; 3],
-    stands_on: usize,
-}
-
-fn file(scans: &[PathBuf], scan: &PlacedScan, room: &Room) -> SceneFile {
-    let scan = scans.iter().zip(&scan.views).map(|(file, view)| ScanEntry {
-        file: file.clone(),
-        points: view.points.len(),
-        sensor: view.sensor.map(Into::into),
-    });
-    let plane = room.planes.iter().enumerate().map(|(i, plane)| PlaneEntry {
-        number: i + 1,
-        kind: name(plane.kind),
-        point: plane.point.into(),
-        normal: plane.normal.into_inner().into(),
-        area: plane.area,
-        outline: plane.outline.iter().map(|p| (*p).into()).collect(),
-    });
-    let object = room.segments.iter().enumerate().map(|(i, segment)| ObjectEntry {
-        number: i + 1,
-        points: segment.points,
-        min: segment.bounds.min.into(),
-        max: segment.bounds.max.into(),
-        centre: segment.centre.into(),
-        stands_on: segment.stands_on + 1,
-    });
-    SceneFile { scan: scan.collect(), plane: plane.collect(), object: object.collect() }
 }
 
 fn picture(scans: &[PathBuf], scan: &PlacedScan, room: &Room, rows: Vec<Vec<String>>) -> RoomData {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
+use nalgebra::Point3;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::verify::{Given, verify};
@@ -25,6 +26,10 @@ pub(super) struct VerifyArgs {
     /// The scan files that it was made for, given as they were to `plan`; none: nothing but the floor
     /// is there.
     scans: Vec<PathBuf>,
+    /// A scene file that `planner scene` wrote, in place of scan files: of its objects the one that
+    /// the plan sweeps is taken, all else, and for a plan of given poses everything, is in the way.
+    #[arg(long = "scene", value_name = "FILE", conflicts_with_all = ["scans", "demo"])]
+    scene_file: Option<PathBuf>,
     /// It was made for a simulated scan.
     #[arg(long, value_enum, conflicts_with = "scans")]
     demo: Option<Demo>,
@@ -47,12 +52,19 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
     let plan = Plan::read(&args.plan)?;
     let robot = args.robot.robot()?;
-    let scene = if args.demo.is_none() && args.scans.is_empty() {
+    let seed = args.seed.unwrap_or(plan.seed);
+    let mut scene = if let Some(file) = &args.scene_file {
+        let swept = plan.surface.first().map(|s| plan.base_pose() * Point3::from(s.point));
+        let choice = swept.map_or_else(|| args.scene.clone(), |point| args.scene.or_at(point));
+        scene(&choice, None, std::slice::from_ref(file), seed, &bars)?
+    } else if args.demo.is_none() && args.scans.is_empty() {
         Scene::empty()
     } else {
-        let seed = args.seed.unwrap_or(plan.seed);
         scene(&args.scene, args.demo, &args.scans, seed, &bars)?
     };
+    if plan.surface.is_empty() {
+        scene = scene.in_the_way();
+    }
     let (arm, collision) = (args.robot.spec()?, args.robot.collision());
     let given = Given { robot: &robot, arm: &arm, scene: &scene, collision: &collision };
     bars.stage("verify", Some(plan.knots.len()));

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context;
+use nalgebra::Isometry3;
 use nullsweep_planner::progress::Progress;
 use nullsweep_surface::PlacedScan;
 use nullsweep_surface::register::register;
@@ -10,13 +11,14 @@ use nullsweep_surface::register::register;
 use crate::bars::Bars;
 
 /// Moves a placed scan to where it fits the others, if that is clearly better than where it stands,
-/// and says so; fails where the fit is not to be trusted.
+/// says so, and gives the motion; fails where the fit is not to be trusted.
 pub(super) fn lay(
     others: &PlacedScan,
     scan: &mut PlacedScan,
     path: &Path,
     bars: &Bars,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Isometry3<f64>> {
+    let mut moved = Isometry3::identity();
     for view in &mut scan.views {
         let found = register(&others.views, view)
             .with_context(|| format!("{}: it does not fit the scans before it", path.display()))?;
@@ -36,16 +38,17 @@ pub(super) fn lay(
                 *point = found.correction * *point;
             }
             view.sensor = view.sensor.map(|sensor| found.correction * sensor);
+            moved = found.correction;
         } else {
             bars.note(&format!("{}: fits the scans before it: {figures}", path.display()));
         }
     }
-    Ok(())
+    Ok(moved)
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry3, Vector3};
+    use nalgebra::Vector3;
     use nullsweep_surface::{Placement, place, simulate};
 
     use super::*;
@@ -61,7 +64,7 @@ mod tests {
         let (path, bars) = (Path::new("two.pcd"), Bars::new());
 
         let mut scan = right.clone();
-        lay(&first, &mut scan, path, &bars).unwrap();
+        assert_eq!(lay(&first, &mut scan, path, &bars).unwrap(), Isometry3::identity());
         assert_eq!(scan, right);
 
         let off = Isometry3::new(Vector3::new(0.025, 0.0, 0.01), Vector3::new(0.0, 0.0, 0.03));

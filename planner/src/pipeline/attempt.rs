@@ -125,7 +125,8 @@ impl Planning<'_> {
         let epsilon = self.fill_in_radius();
         let config = PatchConfig { epsilon, min_points, ..self.job.patches.clone() };
         let found = patches::fill_in(self.scan, left, &config, self.job.tool.reach_angle);
-        found.into_iter().map(|patch| self.bed.raised(patch)).collect()
+        let carried = found.into_iter().filter(|patch| self.bed.carries(patch));
+        carried.map(|patch| self.bed.raised(patch)).collect()
     }
 
     pub(super) fn fill_in_radius(&self) -> f64 {

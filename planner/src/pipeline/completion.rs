@@ -4,11 +4,14 @@
 //! A side trip follows the surface from a stop nearby and comes back the same way. Where none
 //! goes, a jump is put in between two stops that a jump joins anyway, or at the end, where it is
 //! the least detour (cheapest insertion).
+//!
+//! A stop between two jumps would be a touch that sweeps nothing: it gets a stroke, a side trip to a
+//! place beside it.
 
 use std::collections::HashSet;
 
 use nullsweep_robot::JointVector;
-use nullsweep_surface::{Patch, patches};
+use nullsweep_surface::{Patch, SurfacePoint, patches};
 use rayon::prelude::*;
 
 use super::attempt::{Attempt, Planning, Visit};
@@ -21,7 +24,7 @@ use crate::plan::CostKind;
 use crate::roadmap::Edge;
 use crate::sweep::coverage;
 use crate::tour::formulation::{Stop, pose};
-use crate::workcell::{Sample, redundancies};
+use crate::workcell::{Sample, direction, redundancies};
 
 /// Times that patches are put over what is left: a side trip may leave slivers of its own.
 const ROUNDS: usize = 3;
@@ -31,6 +34,10 @@ const WORTH: f64 = 0.1;
 const STOPS: usize = 8;
 /// Samples that a side trip from one stop is tried to, nearest redundancy value first.
 const TARGETS: usize = 12;
+/// Lengths of a stroke, as shares of the pad's width, the one that sweeps more first.
+const STROKES: [f64; 2] = [0.5, 0.15];
+/// Directions in which one is tried.
+const DIRECTIONS: usize = 8;
 /// Headings that a jump is tried to.
 const HEADINGS: usize = 4;
 /// Jumps that are tried to one patch, least detour first, so many side by side.
@@ -65,6 +72,12 @@ impl<C: Cost> Completion<'_, C> {
     fn run(&self, attempt: &mut Attempt) {
         let full = patches::full_neighbourhood(self.planning.scan, self.planning.fill_in_radius());
         let worth = ((WORTH * full as f64) as usize).max(1);
+        // Backwards: a stroke moves only the stops behind it.
+        let stops = attempt.sequence.visits.len();
+        let strokes = (0..stops).rev().filter(|&at| self.stroke(attempt, at)).count();
+        if strokes > 0 {
+            self.renew(attempt);
+        }
         for _ in 0..ROUNDS {
             let mut gained = false;
             let mut left = attempt.left.clone();
@@ -80,13 +93,64 @@ impl<C: Cost> Completion<'_, C> {
                     continue;
                 };
                 gained = true;
-                self.sweep(&attempt.sequence.visits[at].leg, &mut left);
+                let legs = if self.stroke(attempt, at) { at + 1..at + 2 } else { at..at + 1 };
+                attempt.sequence.visits[legs].iter().for_each(|v| self.sweep(&v.leg, &mut left));
             }
             if !gained {
                 return;
             }
-            attempt.plan = self.planning.assemble(&attempt.patches, &attempt.sequence);
-            attempt.left = self.planning.left(&attempt.plan);
+            self.renew(attempt);
+        }
+    }
+
+    /// The plan of the sequence as it is now, and what it leaves out.
+    fn renew(&self, attempt: &mut Attempt) {
+        attempt.plan = self.planning.assemble(&attempt.patches, &attempt.sequence);
+        attempt.left = self.planning.left(&attempt.plan);
+    }
+
+    /// Gives a stop between two jumps a stroke along the surface and back, wherever beside it one
+    /// goes; whether it did.
+    fn stroke(&self, attempt: &mut Attempt, at: usize) -> bool {
+        let Planning { bed, job, .. } = *self.planning;
+        let visits = &attempt.sequence.visits;
+        let jumps_on = visits.get(at + 1).is_none_or(|next| next.leg.is_jump());
+        if !(visits[at].leg.is_jump() && jumps_on) {
+            return false;
+        }
+        let Visit { patch, sample, .. } = &visits[at];
+        let (stop, heading) = (attempt.patches[*patch].clone(), sample.heading);
+        let mut choices = STROKES.iter().flat_map(|share| (0..DIRECTIONS).map(move |k| (share, k)));
+        choices.any(|(share, k)| {
+            let turn = std::f64::consts::TAU * k as f64 / DIRECTIONS as f64;
+            let way = direction(&stop.normal, heading + turn) * (share * job.tool.width);
+            let Some(foot) = bed.surface().project(&(stop.centre + way), &stop.normal) else {
+                return false;
+            };
+            let SurfacePoint { point: centre, normal } = foot;
+            let beside = Patch { centre, normal, points: Vec::new(), rmse: 0.0 };
+            attempt.patches.push(bed.raised(beside));
+            let Some((sample, motion)) = self.insertion(attempt).reach_from(at) else {
+                attempt.patches.pop();
+                return false;
+            };
+            let to = Visit { patch: attempt.patches.len() - 1, sample, leg: motion.path };
+            there_and_back(&mut attempt.sequence.visits, at + 1, to);
+            true
+        })
+    }
+
+    /// The search for motions to the last patch.
+    fn insertion<'a>(&'a self, attempt: &'a Attempt) -> Insertion<'a, C> {
+        let Planning { cell, job, start, .. } = *self.planning;
+        Insertion {
+            planning: self.planning,
+            cost: self.cost,
+            mover: Mover::new(cell, &attempt.graph, &[], self.cost, start, job.seed),
+            patches: &attempt.patches,
+            visits: &attempt.sequence.visits,
+            patch: attempt.patches.len() - 1,
+            values: redundancies(cell.arm.ik().redundancy_range(), job.ik_samples),
         }
     }
 
@@ -103,27 +167,12 @@ impl<C: Cost> Completion<'_, C> {
     /// Puts visits of the last patch into the sequence; their first index, `None` where no motion
     /// there is found.
     fn visit(&self, attempt: &mut Attempt) -> Option<usize> {
-        let Planning { cell, job, start, .. } = *self.planning;
-        let patch = attempt.patches.len() - 1;
-        let mover = Mover::new(cell, &attempt.graph, &[], self.cost, start, job.seed);
-        let insertion = Insertion {
-            planning: self.planning,
-            cost: self.cost,
-            mover,
-            patches: &attempt.patches,
-            visits: &attempt.sequence.visits,
-            patch,
-            values: redundancies(cell.arm.ik().redundancy_range(), job.ik_samples),
-        };
+        let insertion = self.insertion(attempt);
         let (at, there, after) =
             insertion.along_the_surface().or_else(|| insertion.through_free_space())?;
         let visits = &mut attempt.sequence.visits;
         match after {
-            After::Back(back) => {
-                let stop = &visits[at - 1];
-                let back = Visit { patch: stop.patch, sample: stop.sample, leg: back };
-                visits.splice(at..at, [there, back]);
-            }
+            After::Back => there_and_back(visits, at, there),
             After::On(leg) => {
                 visits[at].leg = leg;
                 visits.insert(at, there);
@@ -134,10 +183,18 @@ impl<C: Cost> Completion<'_, C> {
     }
 }
 
+/// Puts a visit to which a way along the surface leads behind the stop that it comes from, and the
+/// same way back.
+fn there_and_back(visits: &mut Vec<Visit>, at: usize, there: Visit) {
+    let Visit { patch, sample, .. } = visits[at - 1];
+    let back = Visit { patch, sample, leg: there.leg.reversed() };
+    visits.splice(at..at, [there, back]);
+}
+
 /// How the arm goes on from a side insertion.
 enum After {
-    /// To the stop that it came from.
-    Back(Leg),
+    /// To the stop that it came from, the same way.
+    Back,
     /// To the next stop, by this leg instead of the one it had.
     On(Leg),
     /// Not at all: it was the last one.
@@ -175,9 +232,8 @@ impl<C: Cost> Insertion<'_, C> {
             near.par_iter().map(|&(_, i)| self.reach_from(i).map(|(s, m)| (i, s, m))).collect();
         let (stop, sample, motion) =
             found.into_iter().flatten().min_by(|a, b| a.2.cost.total_cmp(&b.2.cost))?;
-        let back = motion.path.reversed();
         let visit = Visit { patch: self.patch, sample, leg: motion.path };
-        Some((stop + 1, visit, After::Back(back)))
+        Some((stop + 1, visit, After::Back))
     }
 
     /// A way along the surface from one stop, the pad turned from the line as it is there.

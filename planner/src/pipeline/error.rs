@@ -33,13 +33,15 @@ pub enum PipelineError {
     },
     /// No stance reaches anything.
     #[error(
-        "no stance of {tried} reaches any of the {patches} patches: is the object within the arm's height?"
+        "no stance of {tried} reaches any of the {patches} patches; where most seemed in reach: {why}"
     )]
     NoStance {
         /// Stances tried with an exact look.
         tried: usize,
         /// How many patches.
         patches: usize,
+        /// What is in the way.
+        why: String,
     },
     /// The body collides where it stands.
     #[error("the robot collides where it stands: {hit}")]
@@ -68,12 +70,14 @@ pub enum PipelineError {
         high: f64,
     },
     /// No patch can be reached.
-    #[error("none of the {patches} patches can be reached from base {base:?}")]
+    #[error("none of the {patches} patches can be reached from base {base:?}: {why}")]
     NothingReached {
         /// How many patches.
         patches: usize,
         /// The stance.
         base: [f64; 3],
+        /// What is in the way.
+        why: String,
     },
     /// No motion to any patch was found.
     #[error(

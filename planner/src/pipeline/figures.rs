@@ -6,6 +6,7 @@ use nullsweep_robot::{Arm, JointVector};
 use serde::{Deserialize, Serialize};
 
 use super::attempt::Sequence;
+use super::left_out::LeftOut;
 use crate::cost::{self, Effort};
 use crate::plan::Plan;
 use crate::roadmap::Graph;
@@ -52,6 +53,8 @@ pub struct Figures {
     pub jumps: usize,
     /// Reachable patches that no motion was found to.
     pub dropped_patches: usize,
+    /// What is not swept, by what is in the way.
+    pub left_out: Vec<LeftOut>,
     /// What the finished plan's check found.
     #[serde(flatten)]
     pub verification: Verification,

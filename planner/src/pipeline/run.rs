@@ -10,6 +10,7 @@ use super::clock::Clock;
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
+use super::left_out::{Known, in_words, left_out};
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
 use super::swept::{leave_out_swept, points_of, swept_before};
@@ -59,7 +60,8 @@ pub fn run(
     let patches = clock.time("patches", || {
         let found = patches::find(surface, &job.patches, job.seed);
         let bed = Bed::new(scene, &job.tool);
-        found.into_par_iter().map(|patch| bed.raised(patch)).collect::<Vec<_>>()
+        let carried = found.into_par_iter().filter(|patch| bed.carries(patch));
+        carried.map(|patch| bed.raised(patch)).collect::<Vec<_>>()
     });
     if patches.is_empty() {
         return Err(PipelineError::NoPatches { points: surface.points.len() });
@@ -81,9 +83,12 @@ pub fn run(
         clock.time("reach", || reach(cell, &patches, job.ik_samples, &|| progress.tick()));
     let mut reachable: Vec<bool> = reached.iter().map(Option::is_some).collect();
     if !reachable.contains(&true) {
-        return Err(PipelineError::NothingReached { patches: patches.len(), base: stance.base });
+        let none = vec![false; scan.points.len().max(patches.len())];
+        let why = in_words(&left_out(cell, &Known::unreached(scan, &patches, &none)));
+        let (patches, base) = (patches.len(), stance.base);
+        return Err(PipelineError::NothingReached { patches, base, why });
     }
-    let (found, samples) = (patches.len(), reached);
+    let (found, samples) = (patches.clone(), reached);
     let bed = clock.time("surface", || Bed::new(&here, &job.tool));
     let planning = Planning {
         robot,
@@ -112,11 +117,20 @@ pub fn run(
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
     let verification = clock.time("verify", || verify(&plan, given, &|| progress.tick()))?;
+    let known = Known {
+        scan,
+        patches: &found,
+        reachable: &reachable,
+        dropped: &sequence.dropped,
+        swept: &verification.swept,
+    };
+    let left_out = clock.time("causes", || left_out(cell, &known));
     let figures = Figures {
         points: scan.points.len(),
-        patches: found,
+        patches: found.len(),
+        left_out,
         reachable: reachable.iter().filter(|r| **r).count(),
-        fill_in_patches: patches.len() - found,
+        fill_in_patches: patches.len() - found.len(),
         base: stance.base,
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::error::PipelineError;
 use super::job::{Job, StanceChoice};
+use super::left_out::{Known, in_words, left_out};
 use super::start::start;
 use crate::progress::Silent;
 use crate::roadmap::{GraphConfig, Nodes, graph};
@@ -58,6 +59,7 @@ fn search(
     let sketch = scene.sketch();
     let candidates = stance::candidates(robot, arm, &job.tool, &sketch, patches, options)?;
     let tried = candidates.len();
+    let first = candidates.first().map(|candidate| candidate.stance.clone());
     // Candidates are looked at side by side, each by itself.
     let open: Vec<Result<Option<Open>, PipelineError>> = candidates
         .into_par_iter()
@@ -74,7 +76,14 @@ fn search(
             return Ok(setting);
         }
     }
-    Err(PipelineError::NoStance { tried, patches: patches.len() })
+    let why = match first {
+        None => {
+            "no posture within the limits reaches any, or the body has no place beside the object"
+                .to_owned()
+        }
+        Some(stance) => Setting::new(robot, arm, scene, patches, job, stance)?.why(job),
+    };
+    Err(PipelineError::NoStance { tried, patches: patches.len(), why })
 }
 
 /// A stance that reaches something, not yet looked at as a whole.
@@ -131,6 +140,20 @@ impl Setting {
     /// Whether neither body nor start posture collides.
     fn stands(&self, job: &Job) -> bool {
         start(job, &self.arm, &self.world).is_ok() && self.world.stance_hit().is_none()
+    }
+
+    /// What keeps the arm from everything.
+    fn why(&self, job: &Job) -> String {
+        if let Some(hit) = self.world.stance_hit() {
+            return hit.to_string();
+        }
+        if let Err(error) = start(job, &self.arm, &self.world) {
+            return error.to_string();
+        }
+        let scan = &self.scene.surface;
+        let none = vec![false; scan.points.len().max(self.patches.len())];
+        let known = Known::unreached(scan, &self.patches, &none);
+        in_words(&left_out(self.cell(job), &known))
     }
 
     /// What the stance reaches; `None` where body or start posture collide, or it is nothing.

@@ -7,9 +7,8 @@ use nullsweep_surface::{Grid, Scan};
 use super::pads::contact_motion;
 use crate::plan::Trajectory;
 
-/// For each point of the scan whether the pad passes over it: at some pose the point lies in the
-/// pad's rectangle, within `tool.reach_normal` of the plane `tool.stand_off` ahead of the pad, and
-/// its normal is within `tool.reach_angle` of the pad's axis.
+/// For each point of the scan whether the pad sweeps it at some pose, by the rule that [`Tool`]
+/// states.
 ///
 /// `contact_poses` are the contact frame along the dense motion, in the scan's frame; a third of
 /// the pad's width between them is close enough.

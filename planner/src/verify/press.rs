@@ -10,8 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::percentile::percentile;
 use crate::workcell::Scene;
 
-/// Farthest before the pad's plane that a point may lie and be touched. \[m\]
-const TOUCH: f64 = 0.002;
 /// Farthest before it that a point belongs to what the pad lies on. \[m\]
 const UNDER: f64 = 0.02;
 /// Radius within which the point under the pad's centre is looked for. \[m\]
@@ -31,8 +29,8 @@ pub struct Press {
     pub facing_p95_rad: f64,
     /// The largest. \[rad\]
     pub facing_max_rad: f64,
-    /// Share of the surface's points before the pad that are no farther than 2 mm from its plane, in
-    /// the median.
+    /// Share of the surface's points before the pad that it touches, those no farther before its plane
+    /// than [`Tool::hover`], in the median.
     pub touching_p50: f64,
 }
 
@@ -66,7 +64,7 @@ pub(super) fn press(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Pre
                 deepest = deepest.max(-p.z);
                 let faces = normal.is_some_and(|n| -n.dot(&axis) >= tool.reach_angle.cos());
                 under += usize::from(faces);
-                touched += usize::from(faces && p.z <= TOUCH + tool.stand_off);
+                touched += usize::from(faces && p.z <= tool.hover());
             }
         });
         let facing = nearest.1.map_or(0.0, |n| (-n.dot(&axis)).clamp(-1.0, 1.0).acos());

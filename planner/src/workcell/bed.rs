@@ -12,8 +12,8 @@ use super::scene::Scene;
 
 /// The pad is raised until this much is left of what it may be pressed. \[m\]
 const SPARE: f64 = 0.0005;
-/// Farthest that its centre is raised off the surface: a sponge still touches where it is pressed
-/// elsewhere. \[m\]
+/// Farthest that its centre is raised off the surface, and besides by what it is pressed in: a sponge
+/// still touches where it is pressed elsewhere. \[m\]
 const HIGHEST: f64 = 0.005;
 /// What rises higher over the pad's plane is no unevenness but another thing, which the pad has to
 /// keep away from. \[m\]
@@ -32,8 +32,9 @@ pub struct Bed {
     grid: Grid,
     /// Radius of the disc around the pad's centre that is looked at: half its long side. \[m\]
     radius: f64,
-    /// How deep a point may press. \[m\]
+    /// How deep a point may press, and how far the pad may be raised for it. \[m\]
     deepest: f64,
+    highest: f64,
     /// Cosine of the largest angle between the pad's axis and the normal under its centre.
     facing: f64,
 }
@@ -46,22 +47,32 @@ impl Bed {
         let points: Vec<Point3<f64>> =
             surface.points.iter().chain(surroundings).chain(raw).copied().collect();
         let deepest = (tool.press_max - SPARE).max(0.0) + tool.stand_off;
+        let highest = HIGHEST - tool.stand_off.min(0.0);
         let (surface, radius) = (Surface::new(surface), 0.5 * tool.length.max(tool.width));
         let grid = Grid::new(&points, radius);
-        Self { surface, points, grid, radius, deepest, facing: tool.reach_angle.cos() }
+        let facing = tool.reach_angle.cos();
+        Self { surface, points, grid, radius, deepest, highest, facing }
     }
 
     /// A surface into which the pad may be pressed as deep as it likes, in any direction.
     #[must_use]
     pub fn soft(surface: Surface) -> Self {
         let (points, grid) = (Vec::new(), Grid::new(&[], 1.0));
-        Self { surface, points, grid, radius: 0.0, deepest: f64::INFINITY, facing: -1.0 }
+        let deepest = f64::INFINITY;
+        Self { surface, points, grid, radius: 0.0, deepest, highest: 0.0, facing: -1.0 }
     }
 
     /// The surface as it is.
     #[must_use]
     pub fn surface(&self) -> &Surface {
         &self.surface
+    }
+
+    /// Whether there is surface under the middle of a patch. On a sparse scan few points may make a
+    /// plane, and none of them be near its middle.
+    #[must_use]
+    pub fn carries(&self, patch: &Patch) -> bool {
+        self.surface.project(&patch.centre, &patch.normal).is_some()
     }
 
     /// The patch as the pad comes to lie on it: where something presses it in too deep tilted so
@@ -83,7 +94,7 @@ impl Bed {
             }
         }
         let (over, normal) = best;
-        Patch { centre: patch.centre + normal.scale(over.min(HIGHEST)), normal, ..patch }
+        Patch { centre: patch.centre + normal.scale(over.min(self.highest)), normal, ..patch }
     }
 
     /// [`Surface::line`], raised between its ends. `None` too where the pad would not sweep the
@@ -142,7 +153,7 @@ impl Bed {
     /// How far a pad with its centre here, already so far `off` the surface, has to be raised along
     /// the normal. \[m\]
     fn lift(&self, at: &SurfacePoint, off: f64) -> f64 {
-        self.over(at).clamp(0.0, (HIGHEST - off).max(0.0))
+        self.over(at).clamp(0.0, (self.highest - off).max(0.0))
     }
 
     /// How much too deep a pad with its centre here is pressed in; negative: what is left. \[m\]
@@ -203,9 +214,24 @@ mod tests {
         }
     }
 
+    /// A pad that is laid onto the surface.
+    fn laid() -> Tool {
+        Tool { stand_off: 0.0, ..Tool::default() }
+    }
+
+    #[test]
+    fn a_pad_that_is_pressed_in_is_raised_by_so_much_more() {
+        let pressed = Tool { stand_off: -0.004, ..Tool::default() };
+        // 10 mm less what is spared and what it is pressed in are left.
+        for (height, lift) in [(0.005, 0.0), (0.008, 0.0025), (0.013, 0.0075), (0.024, 0.009)] {
+            let found = Bed::new(&ridge(height), &pressed).lift(&flat(0.04), 0.0);
+            assert!((found - lift).abs() < 1e-4, "{height} m: {found}");
+        }
+    }
+
     #[test]
     fn the_pad_is_raised_where_something_presses_it_in_too_deep() {
-        let tool = Tool::default();
+        let tool = laid();
         let bed = Bed::new(&ridge(0.013), &tool);
         // 13 mm press on a pad that gives way by 10.
         let lift = bed.lift(&flat(0.04), 0.0);
@@ -224,7 +250,7 @@ mod tests {
 
     #[test]
     fn a_line_is_raised_gently_and_its_ends_stay() {
-        let tool = Tool::default();
+        let tool = laid();
         let bed = Bed::new(&ridge(0.013), &tool);
         let (a, b) = (flat(-0.15), flat(-0.035));
         let line = bed.line(&a, &b, 0.006, 0.07).unwrap();

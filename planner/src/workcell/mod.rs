@@ -2,6 +2,7 @@
 
 mod bed;
 mod contact;
+mod obstruction;
 mod reach;
 mod sample;
 mod scene;
@@ -9,6 +10,7 @@ pub mod stance;
 
 pub use bed::Bed;
 pub use contact::{contact_pose, direction, heading_of, tangents};
+pub use obstruction::{Cause, Obstruction, obstruction};
 pub use reach::reach;
 pub use sample::{Sample, Workcell, middle_out, redundancies};
 pub use scene::Scene;

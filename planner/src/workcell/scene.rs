@@ -102,6 +102,15 @@ impl Scene {
         (Self { surroundings: rest, raw, unseen, ..Self::on_floor(surface) }, flying)
     }
 
+    /// The scene with nothing to sweep: all that was measured is in the way.
+    #[must_use]
+    pub fn in_the_way(self) -> Self {
+        let Self { surface, mut surroundings, raw, unseen, obstacles } = self;
+        surroundings.extend(surface.points);
+        surroundings.extend(raw);
+        Self { surroundings, unseen, ..Self::of_obstacles(obstacles) }
+    }
+
     /// The scene with fewer points around the surface, to judge many stances by.
     #[must_use]
     pub fn sketch(&self) -> Self {

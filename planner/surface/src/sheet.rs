@@ -42,8 +42,12 @@ const GAP: f64 = 0.010;
 /// Rounds of projecting and fitting anew at the foot point.
 const ROUNDS: usize = 3;
 
-/// Fewest points that make a piece of surface.
-const MIN_POINTS: usize = 6;
+/// Fewest points that the surface is fitted to. A fit has four terms: of fewer points, hardly any is
+/// left to say that it is right, and a pad would be led over a hole.
+const FIT_POINTS: usize = 10;
+
+/// Fewest points that a plane is laid through to measure a distance.
+const PLANE_POINTS: usize = 6;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -188,7 +192,7 @@ impl Surface {
                 fit.add(neighbour, weight(squared / self.raw_radius.powi(2)));
             }
         });
-        match fit.solve().filter(|_| count >= MIN_POINTS) {
+        match fit.solve().filter(|_| count >= PLANE_POINTS) {
             Some(plane) => {
                 let height = (point - plane.centroid).dot(&plane.normal);
                 // Noise puts the nearest raw point off the plane too; two spacings allow for it.
@@ -219,7 +223,7 @@ impl Surface {
                 fit.add(position, agreement * weight(squared * scale));
             }
         });
-        if count < MIN_POINTS || border > self.gap * self.gap {
+        if count < FIT_POINTS || border > self.gap * self.gap {
             return None;
         }
         let (point, found) = fit.solve()?;
@@ -262,7 +266,7 @@ fn noise(grid: &Grid, points: &[Point3<f64>], normals: &[UnitVector3<f64>], radi
                     fit.add(position, weight(squared / (radius * radius)));
                 }
             });
-            let (foot, _) = fit.solve().filter(|_| count >= MIN_POINTS)?;
+            let (foot, _) = fit.solve().filter(|_| count >= FIT_POINTS)?;
             Some((points[i] - foot).norm())
         })
         .collect();

@@ -14,9 +14,13 @@ use crate::scan::{PlacedScan, Scan, View};
 
 /// Side of the cells of space. \[m\]
 const CELL: f64 = 0.01;
-/// A place counts as unseen from so far behind what was measured: so deep may the sensor be wrong,
-/// and so thin may a thing be. \[m\]
-const DEPTH: f64 = 0.02;
+/// How deep something may come into what no view has seen: so deep may the sensor be wrong, and so
+/// thin may a thing be. \[m\]
+const DEEPEST: f64 = 0.02;
+/// A place counts as unseen from so far behind what was measured. Of what begins there the first
+/// centre of a cell may lie a whole cell deeper, and half a cell is what robot and tool keep from it.
+/// \[m\]
+const DEPTH: f64 = DEEPEST - 0.5 * CELL;
 /// How far the unseen is looked at around the surface. \[m\]
 const AROUND: f64 = 0.6;
 /// Directions are told apart by this angle, and by no less than a few measurements. \[rad\]
@@ -206,7 +210,7 @@ mod tests {
             points: points.clone(),
             spacing: 0.004,
         };
-        (View { points, normals: None, sensor }, surface)
+        (View { points, sensor, ..View::default() }, surface)
     }
 
     #[test]

@@ -57,7 +57,7 @@ fn seen(seed: u64) -> (RawScan, UnitVector3<f64>) {
         .map(|p| Point3::from(turn * (p - eye)))
         .filter(|p| p.z > 0.2 && p.x.abs() < p.z && p.y.abs() < p.z)
         .collect();
-    let raw = RawScan { points, normals: None, viewpoint: None, dropped: 0, warnings: Vec::new() };
+    let raw = RawScan { points, ..RawScan::default() };
     (raw, UnitVector3::new_normalize(turn * Vector3::z()))
 }
 

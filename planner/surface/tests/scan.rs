@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{UnitVector3, Vector3};
 use nullsweep_surface::{
-    CleanConfig, PatchConfig, Placement, ReadOptions, Scan, ScanError, patches, scan, scan::Format,
-    scan::ScanWarning, simulate, simulate::SimulatedView,
+    CleanConfig, Grid, PatchConfig, Placement, ReadOptions, Scan, ScanError, patches, scan,
+    scan::Format, scan::ScanWarning, simulate, simulate::SimulatedView,
 };
 
 /// The test data, or `None` with the reason printed.
@@ -144,6 +144,11 @@ fn a_mesh_without_a_sensor_has_outward_normals() {
         .collect();
     let share = level.iter().filter(|&&z| z > 0.0).count() as f64 / level.len() as f64;
     assert!(level.len() > 100 && share > 0.95, "{share:.2} of {} look up", level.len());
+    // No camera made it, so nothing flies: what is too thin for a surface is known too.
+    let known = Grid::new(&scan.points, 0.015);
+    let lost =
+        placed.views[0].points.iter().filter(|p| known.nearest(p, 0.015, |_| true).is_none());
+    assert_eq!(lost.count(), 0);
 }
 
 #[test]

@@ -202,8 +202,8 @@ mod tests {
     fn moved(view: &View, pose: &Isometry3<f64>) -> View {
         View {
             points: view.points.iter().map(|p| pose * p).collect(),
-            normals: None,
             sensor: view.sensor.map(|s| pose * s),
+            ..View::default()
         }
     }
 
@@ -237,8 +237,8 @@ mod tests {
         let at = |i: usize| 0.004 * i as f64;
         let plate = View {
             points: (0..120 * 120).map(|i| Point3::new(at(i % 120), at(i / 120), 0.5)).collect(),
-            normals: None,
             sensor: Some(Point3::new(0.2, 0.2, 2.0)),
+            ..View::default()
         };
         let error = register(std::slice::from_ref(&plate), &plate).unwrap_err();
         assert!(matches!(error, RegisterError::Slides { .. }), "{error}");
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn no_cloud_at_all_is_refused() {
-        let empty = View { points: Vec::new(), normals: None, sensor: None };
+        let empty = View::default();
         assert!(register(&[], &empty).is_err());
     }
 }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::cloud::{MIN_POINTS, Scan};
 use super::error::ScanError;
+use super::loose;
 use super::normals;
 use super::place::PlacedScan;
 use crate::fit::{HeightFit, weight};
@@ -50,9 +51,9 @@ pub struct CleanReport {
     pub kept: usize,
     /// Points merged into others.
     pub merged: usize,
-    /// Points dropped as outliers or farther than 20 m from the scan's middle.
+    /// Points left out of the surface as outliers or farther than 20 m from the scan's middle.
     pub outliers: usize,
-    /// Points dropped because their neighbours form no surface.
+    /// Points left out of it because their neighbours form no surface.
     pub loose: usize,
     /// The voxel used. \[m\]
     pub voxel: f64,
@@ -72,7 +73,9 @@ const EDGE_ANGLE: f64 = 0.45;
 /// Cleans views into one scan: points of each view are merged by voxels, outliers dropped, normals
 /// estimated within each view and oriented (to the normals of the file, else to the sensor, else
 /// outwards), then all points are smoothed on all views by a moving least squares fit that weighs
-/// neighbours by distance and by agreement of normals (as Öztireli, Guennebaud & Gross 2009).
+/// neighbours by distance and by agreement of normals (as Öztireli, Guennebaud & Gross 2009). Of views
+/// without a sensor every point is a thing: those that the surface leaves out are there again at its
+/// end, as they were measured.
 ///
 /// # Errors
 /// [`ScanError::NoSurface`] when fewer than 15 points are left.
@@ -104,11 +107,12 @@ pub fn clean(scan: &PlacedScan, config: &CleanConfig) -> Result<(Scan, CleanRepo
     let noise = (squares / points.len() as f64).sqrt();
     let smooth = merge_layers(&smooth, &normals, &points, voxel);
     let spacing = median_spacing(&smooth.points);
-    let scan = Scan { spacing, ..smooth };
+    let merged = merged + points.len() - smooth.points.len();
+    let scan = loose::join(Scan { spacing, ..smooth }, scan, voxel);
     let report = CleanReport {
         points: total,
         kept: scan.points.len(),
-        merged: merged + points.len() - scan.points.len(),
+        merged,
         outliers,
         loose,
         voxel,

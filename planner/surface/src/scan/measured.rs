@@ -8,7 +8,7 @@ use super::place::PlacedScan;
 use crate::grid::Grid;
 
 /// A point this near to a point of the surface is the surface, seen with the sensor's noise. \[m\]
-const STANDS_FOR: f64 = 0.015;
+pub(super) const STANDS_FOR: f64 = 0.015;
 /// A thing has at least this many points more …
 const COMPANY: usize = 3;
 /// … this near to each of its points, or four spacings of the surface; a pixel that flies alone
@@ -20,7 +20,8 @@ const NEAR: f64 = 0.02;
 pub struct Measured {
     /// Those for which the surface stands, as they were measured.
     pub raw: Vec<Point3<f64>>,
-    /// Those that it leaves out: what lies beside the region, and what cleaning has dropped.
+    /// Those that it leaves out: what lies beside the region, what cleaning has dropped, and, measured
+    /// too, places inside of closed meshes.
     pub rest: Vec<Point3<f64>>,
     /// Flying pixels: left out by the surface, and alone. Only a depth camera has them: where no
     /// sensor is known, every point is a thing.
@@ -56,6 +57,7 @@ pub fn measured(scan: &PlacedScan, surface: &Scan) -> Measured {
         })
         .collect();
     let mut measured = Measured::default();
+    measured.rest.extend(scan.views.iter().flat_map(|view| &view.inside));
     for (point, (is_known, is_alone)) in all.into_iter().zip(kinds) {
         let kind = match (is_known, is_alone) {
             (true, _) => &mut measured.raw,
@@ -92,7 +94,7 @@ mod tests {
         let pixel = Point3::new(0.0, 0.0, 0.1);
         let points = noisy.iter().chain(&post).copied().chain([pixel]).collect();
         let sensor = Some(Point3::new(0.0, 0.0, 2.0));
-        let mut placed = PlacedScan { views: vec![View { points, normals: None, sensor }] };
+        let mut placed = PlacedScan { views: vec![View { points, sensor, ..View::default() }] };
         let found = measured(&placed, &surface);
         assert_eq!(found.raw, noisy);
         assert_eq!(found.rest, post);

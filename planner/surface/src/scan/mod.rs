@@ -16,6 +16,8 @@ mod crop;
 mod decode;
 mod error;
 mod foreign;
+mod inside;
+mod loose;
 mod measured;
 mod mesh;
 mod normals;

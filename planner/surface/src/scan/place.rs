@@ -46,12 +46,14 @@ pub enum Placement {
 }
 
 /// One view in the floor frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct View {
     /// Points in the floor frame. \[m\]
     pub points: Vec<Point3<f64>>,
     /// Normals that the file gave, parallel to `points`.
     pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// Places inside what its closed meshes enclose. \[m\]
+    pub inside: Vec<Point3<f64>>,
     /// Where the sensor stood; `None`: unknown. \[m\]
     pub sensor: Option<Point3<f64>>,
 }
@@ -95,6 +97,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
             .normals
             .as_ref()
             .map(|normals| normals.iter().map(|n| pose.rotation * n).collect()),
+        inside: raw.inside.iter().map(|p| pose * p).collect(),
         sensor,
     };
     (PlacedScan { views: vec![view] }, pose)
@@ -158,6 +161,7 @@ fn crop(view: &View, region: &CropBox) -> View {
     View {
         points: kept.iter().map(|&i| view.points[i]).collect(),
         normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
+        inside: view.inside.iter().copied().filter(|p| region.contains(p)).collect(),
         sensor: view.sensor,
     }
 }
@@ -191,7 +195,7 @@ mod tests {
     use super::*;
 
     fn raw(points: Vec<Point3<f64>>) -> RawScan {
-        RawScan { points, normals: None, viewpoint: None, dropped: 0, warnings: Vec::new() }
+        RawScan { points, ..RawScan::default() }
     }
 
     #[test]

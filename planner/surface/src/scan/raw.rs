@@ -5,12 +5,14 @@ use nalgebra::{Isometry3, Point3, UnitVector3};
 use super::warning::ScanWarning;
 
 /// Points as the file holds them: finite, scaled to metres, in the file's own frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawScan {
     /// The finite points. \[m\]
     pub points: Vec<Point3<f64>>,
     /// Unit normals parallel to `points`, where the file has a usable one for every point.
     pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// Places inside what closed meshes enclose, on a grid. \[m\]
+    pub inside: Vec<Point3<f64>>,
     /// Pose of the sensor in the frame of the points, where a PCD header states other than the
     /// identity that every writer fills in. Advisory: files exist whose header turns points that
     /// are already in the optical frame, so it is applied only on request

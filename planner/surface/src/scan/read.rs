@@ -9,7 +9,7 @@ use super::error::{Malformed, ScanError};
 use super::parsed::Parsed;
 use super::raw::RawScan;
 use super::warning::ScanWarning;
-use super::{decode, foreign, mesh, pcd, ply, sample, stray, text, winding};
+use super::{decode, foreign, inside, mesh, pcd, ply, sample, stray, text, winding};
 
 /// How to read a scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,9 +121,10 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     if let Some(pose) = &mut viewpoint {
         pose.translation.vector *= scale;
     }
-    let mut dropped = 0;
+    let (mut dropped, mut inside) = (0, Vec::new());
     if !triangles.is_empty() {
         let wound = winding::outward(&points, triangles, &mut warnings);
+        inside = inside::fill(&points, &wound);
         (points, normals, dropped) =
             sample::sample(&points, &wound, options.mesh_spacing, options.seed, &mut warnings);
     }
@@ -168,7 +169,7 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     let normals = (normals.len() == points.len())
         .then(|| normals.into_iter().map(unit).collect::<Option<Vec<_>>>())
         .flatten();
-    Ok(RawScan { points, normals, viewpoint, dropped, warnings })
+    Ok(RawScan { points, normals, inside, viewpoint, dropped, warnings })
 }
 
 /// The factor to metres: the user's, else 1, as what the columns say is in the points by now.

@@ -12,6 +12,8 @@ use super::warning::ScanWarning;
 pub(super) struct Wound {
     pub(super) triangles: Vec<[usize; 3]>,
     pub(super) turned: Vec<bool>,
+    /// Which faces are of pieces that enclose something and know their outside.
+    pub(super) closed: Vec<bool>,
 }
 
 /// Leaves out faces that cover others, and finds the outside of each connected piece: a closed one
@@ -43,7 +45,7 @@ pub(super) fn outward(
     };
     let solids: Vec<Solid> =
         pieces.iter().filter(|p| p.closed).map(|p| Solid::new(faces(p, false))).collect();
-    let mut turned = vec![false; of];
+    let (mut turned, mut closed) = (vec![false; of], vec![false; of]);
     let mut unknown = 0;
     for piece in &pieces {
         // Most of the piece's area as the file has it.
@@ -73,6 +75,7 @@ pub(super) fn outward(
         let turn = if verdict == Some(false) { !given } else { given };
         for &(face, against) in &piece.faces {
             turned[face] = piece.oriented && (against != turn);
+            closed[face] = piece.closed && verdict.is_some();
         }
     }
     let faces = turned.iter().filter(|&&t| t).count();
@@ -82,7 +85,7 @@ pub(super) fn outward(
     if unknown > 0 {
         warnings.push(ScanWarning::SideUnknown { faces: unknown, of });
     }
-    Wound { triangles, turned }
+    Wound { triangles, turned, closed }
 }
 
 /// Each face once, whichever way round it is there again.

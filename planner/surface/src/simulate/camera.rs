@@ -92,8 +92,7 @@ impl Kinect {
                 depth.map(|z| Point3::from(ray * (z + Self::noise(z) * gaussian(&mut rng))))
             })
             .collect();
-        let scan =
-            RawScan { points, normals: None, viewpoint: None, dropped: 0, warnings: Vec::new() };
+        let scan = RawScan { points, ..RawScan::default() };
         SimulatedView { scan, sensor_pose }
     }
 

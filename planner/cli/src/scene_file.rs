@@ -1,0 +1,145 @@
+//! Scene files: where scans stand, and what was found in them.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use nullsweep_surface::room::Room;
+use nullsweep_surface::{PlacedScan, Placement, ReadOptions, scan};
+use serde::{Deserialize, Serialize};
+
+use crate::numbers::isometry;
+use crate::placed::{Placed, PlacedArgs};
+use crate::room::name;
+
+/// A scene file: all in the floor frame, in metres.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    /// By which planes and objects were found, and points laid on meshes.
+    seed: u64,
+    scan: Vec<ScanEntry>,
+    #[serde(default)]
+    plane: Vec<PlaneEntry>,
+    #[serde(default)]
+    object: Vec<ObjectEntry>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScanEntry {
+    /// From the scene file's folder.
+    file: PathBuf,
+    points: usize,
+    /// Factor from the file's unit to metres.
+    scale: f64,
+    /// Takes the file's coordinates to the floor frame: x, y, z, qx, qy, qz, qw.
+    pose: [f64; 7],
+    /// Where its sensor stood, if that is known.
+    sensor: Option<[f64; 3]>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlaneEntry {
+    number: usize,
+    kind: String,
+    point: [f64; 3],
+    normal: [f64; 3],
+    area: f64,
+    outline: Vec<[f64; 3]>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectEntry {
+    number: usize,
+    points: usize,
+    min: [f64; 3],
+    max: [f64; 3],
+    centre: [f64; 3],
+    stands_on: usize,
+}
+
+impl SceneFile {
+    /// The file of a room, to be written at `path`.
+    pub(super) fn of(
+        path: &Path,
+        args: &PlacedArgs,
+        scans: &[PathBuf],
+        placed: &Placed,
+        room: &Room,
+        seed: u64,
+    ) -> anyhow::Result<Self> {
+        let folder = std::path::absolute(path)?;
+        let mut scan = Vec::with_capacity(scans.len());
+        for ((file, view), pose) in scans.iter().zip(&placed.scan.views).zip(&placed.poses) {
+            let file = std::path::absolute(file)?;
+            let near = folder.parent().and_then(|folder| file.strip_prefix(folder).ok());
+            let (t, r) = (pose.translation.vector, pose.rotation.coords);
+            scan.push(ScanEntry {
+                file: near.map_or_else(|| file.clone(), Path::to_path_buf),
+                points: view.points.len(),
+                scale: args.scale,
+                pose: [t.x, t.y, t.z, r.x, r.y, r.z, r.w],
+                sensor: view.sensor.map(Into::into),
+            });
+        }
+        let plane = room.planes.iter().enumerate().map(|(i, plane)| PlaneEntry {
+            number: i + 1,
+            kind: name(plane.kind).to_owned(),
+            point: plane.point.into(),
+            normal: plane.normal.into_inner().into(),
+            area: plane.area,
+            outline: plane.outline.iter().map(|p| (*p).into()).collect(),
+        });
+        let object = room.segments.iter().enumerate().map(|(i, segment)| ObjectEntry {
+            number: i + 1,
+            points: segment.points,
+            min: segment.bounds.min.into(),
+            max: segment.bounds.max.into(),
+            centre: segment.centre.into(),
+            stands_on: segment.stands_on + 1,
+        });
+        Ok(Self { seed, scan, plane: plane.collect(), object: object.collect() })
+    }
+
+    pub(super) fn write(&self, path: &Path) -> anyhow::Result<()> {
+        let text = toml::to_string(self)?;
+        std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// The scans of a scene file where they stand.
+    pub(super) fn read(path: &Path) -> anyhow::Result<Placed> {
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("cannot read {}", path.display()))?;
+        let file: Self = toml::from_str(&text).with_context(|| {
+            format!(
+                "{}: not a scene file: `planner scene SCAN… --out FILE` writes one",
+                path.display()
+            )
+        })?;
+        ensure!(!file.scan.is_empty(), "{}: a scene without scans", path.display());
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let (mut joined, mut poses) = (PlacedScan::default(), Vec::new());
+        for entry in &file.scan {
+            let name = folder.join(&entry.file);
+            let options =
+                ReadOptions { scale: entry.scale, seed: file.seed, ..ReadOptions::default() };
+            let raw = scan::read(&name, &options)?;
+            ensure!(
+                raw.points.len() == entry.points,
+                "{} has {} points, {} when {} was written: run `planner scene` again",
+                name.display(),
+                raw.points.len(),
+                entry.points,
+                path.display()
+            );
+            let pose = isometry(&entry.pose)
+                .with_context(|| format!("{}: pose of {}", path.display(), name.display()))?;
+            let placement = Placement::Frame { pose, sensor: entry.sensor.map(Into::into) };
+            joined.join(scan::place(&raw, &placement).0);
+            poses.push(pose);
+        }
+        Ok(Placed { scan: joined, poses, seed: Some(file.seed) })
+    }
+}

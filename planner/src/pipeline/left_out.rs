@@ -1,0 +1,112 @@
+//! What a plan does not sweep, by what is in the way.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nullsweep_surface::{Patch, Scan};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::workcell::{Cause, Workcell, obstruction};
+
+/// All that one cause keeps from being swept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// What is in the way.
+    #[serde(flatten)]
+    pub cause: Cause,
+    /// Patches that it concerns.
+    pub patches: usize,
+    /// Share of all scanned points.
+    pub share: f64,
+    /// By how much the posture that comes nearest falls short, least and most of the patches: of a
+    /// margin \[m\], of a limit \[rad\] or \[m\]; none for what is no matter of postures.
+    pub short: Option<[f64; 2]>,
+}
+
+impl std::fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let percent = 100.0 * self.share;
+        match self.patches {
+            0 => write!(f, "{percent:.1} % of the surface"),
+            1 => write!(f, "1 patch, {percent:.1} % of the surface"),
+            n => write!(f, "{n} patches, {percent:.1} % of the surface"),
+        }?;
+        match (&self.cause, self.short) {
+            (Cause::Limit { .. }, Some([least, most])) => {
+                write!(f, ", by {least:.2} … {most:.2} rad or m")
+            }
+            (_, Some([least, most])) => {
+                write!(f, ", short by {:.0} … {:.0} mm", 1e3 * least, 1e3 * most)
+            }
+            (_, None) => Ok(()),
+        }
+    }
+}
+
+/// What is known of the surface.
+pub(super) struct Known<'a> {
+    pub(super) scan: &'a Scan,
+    pub(super) patches: &'a [Patch],
+    /// Which patches the arm reaches.
+    pub(super) reachable: &'a [bool],
+    /// Reached patches that no motion leads to.
+    pub(super) dropped: &'a [usize],
+    /// Which points are swept.
+    pub(super) swept: &'a [bool],
+}
+
+impl<'a> Known<'a> {
+    /// Nothing is reached.
+    pub(super) fn unreached(scan: &'a Scan, patches: &'a [Patch], none: &'a [bool]) -> Self {
+        let (reachable, swept) = (&none[..patches.len()], &none[..scan.points.len()]);
+        Self { scan, patches, reachable, dropped: &[], swept }
+    }
+}
+
+/// The points that are not swept, by cause, the one that concerns most of them first: their shares
+/// add up to what is not swept.
+pub(super) fn left_out(cell: Workcell<'_>, known: &Known<'_>) -> Vec<LeftOut> {
+    let Known { scan, patches, reachable, dropped, swept } = *known;
+    let mut owner: Vec<Option<usize>> = vec![None; scan.points.len()];
+    for (p, patch) in patches.iter().enumerate() {
+        patch.points.iter().for_each(|&i| owner[i as usize] = Some(p));
+    }
+    let causes: Vec<(Cause, Option<f64>)> = patches
+        .par_iter()
+        .enumerate()
+        .map(|(p, patch)| match (reachable[p], dropped.contains(&p)) {
+            (true, false) => (Cause::Passed, None),
+            (true, true) => (Cause::NoMotion, None),
+            (false, _) if patch.points.iter().all(|&i| swept[i as usize]) => (Cause::Passed, None),
+            (false, _) => {
+                let found = obstruction(cell, patch);
+                (found.cause, Some(found.short).filter(|short| *short > 0.0))
+            }
+        })
+        .collect();
+    let mut rows: BTreeMap<&Cause, (usize, BTreeSet<usize>)> = BTreeMap::new();
+    for (owner, _) in owner.iter().zip(swept).filter(|(_, swept)| !**swept) {
+        let row = rows.entry(owner.map_or(&Cause::Uneven, |p| &causes[p].0)).or_default();
+        row.0 += 1;
+        row.1.extend(owner);
+    }
+    let total = scan.points.len().max(1) as f64;
+    let mut found: Vec<LeftOut> = rows
+        .into_iter()
+        .map(|(cause, (points, of))| {
+            let short = of.iter().filter_map(|&p| causes[p].1).map(|s| [s, s]);
+            let short = short.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+            let share = points as f64 / total;
+            LeftOut { cause: cause.clone(), patches: of.len(), share, short }
+        })
+        .collect();
+    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    found
+}
+
+/// The first few causes in a line, for an error.
+pub(super) fn in_words(causes: &[LeftOut]) -> String {
+    const FEW: usize = 4;
+    let said = causes.iter().take(FEW).map(|c| format!("{}: {c}", c.cause));
+    said.collect::<Vec<_>>().join("; ")
+}
