@@ -131,7 +131,7 @@ class Curves {
       lines.slice(-2).forEach((line, k) => {
         const value = valueAt(line, time);
         pen.fillStyle = style.getPropertyValue(line.colour);
-        const text = Number.isFinite(value) ? `${row.least?.(line) ?? ''}${value.toFixed(row.digits ?? 3)} ${row.unit}` : '–';
+        const text = Number.isFinite(value) ? `${value >= row.most - 1e-3 ? '≥ ' : ''}${value.toFixed(row.digits ?? 3)} ${row.unit}` : '–';
         pen.fillText(text, this.width - RIGHT + 6, i * ROW + 24 + 15 * k);
       });
     });

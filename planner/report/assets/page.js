@@ -292,7 +292,7 @@ function scale() {
 }
 
 /** A ball about what matters: the given focus. */
-function overview(at_once) { space.mark = null; space.fly(data.focus.at, data.focus.radius, { turn: -2.35, tilt: 0.5 }, at_once); }
+function overview(at_once) { space.mark = null; space.fly(data.focus.at, data.focus.radius, { turn: data.focus.turn, tilt: 0.45 }, at_once); }
 
 // ---- the list ------------------------------------------------------------------------------
 
@@ -362,8 +362,9 @@ function rowsOf(what) {
       lines: both(m => velocities(m, j)) }));
   }
   const names = [...new Set(plans.flatMap(m => m.series.map(s => s.name)))];
-  return names.map(name => ({ name: name.replace(', ', '\n'), unit: plans.flatMap(m => m.series).find(s => s.name === name).unit,
-    zero: true, digits: 1,
+  const first = name => plans.flatMap(m => m.series).find(s => s.name === name);
+  return names.map(name => ({ name: name.replace(', ', '\n'), unit: first(name).unit,
+    most: first(name).most ?? Infinity, zero: true, digits: 1,
     lines: lines(plans.filter(m => m.series.some(s => s.name === name)),
       m => m.series.find(s => s.name === name), COLOURS) }));
 }

@@ -246,7 +246,7 @@ class Space {
   fly(target, radius, view = {}, at_once = false) {
     const from = { ...this.camera };
     const wide = Math.min(1, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight));
-    const to = { ...from, ...view, target, distance: 1.15 * radius / Math.sin(FOV / 2) / wide };
+    const to = { ...from, ...view, target, distance: radius / Math.sin(FOV / 2) / wide };
     if (at_once || matchMedia('(prefers-reduced-motion: reduce)').matches) {
       this.camera = to;
       this.touch();

@@ -246,6 +246,8 @@ pub struct Series {
     pub times: Vec<f64>,
     /// NaN: there is none.
     pub values: Vec<f64>,
+    /// The value that stands for all beyond it.
+    pub most: Option<f64>,
 }
 
 /// Where the pad's centre is at a time.

@@ -11,6 +11,9 @@ use crate::data::{Body, Cloud, LineSet, Look, Motion, Paint, Place, ReportData, 
 /// Most points shown of one cloud; more neither show more nor load well.
 const MAX_POINTS: usize = 60_000;
 
+/// How far aside of the way ahead the page is seen from at first. \[rad\]
+const ASIDE: f64 = 1.15;
+
 /// The whole page's data.
 pub(super) fn value(data: &ReportData) -> Value {
     json!({
@@ -155,6 +158,7 @@ fn series(series: &Series) -> Value {
         "unit": series.unit,
         "times": floats(series.times.iter().copied()),
         "values": floats(series.values.iter().copied()),
+        "most": series.most,
     })
 }
 
@@ -167,22 +171,34 @@ fn bounds<'a>(
     })
 }
 
-/// The ball that the page opens on: what is to be swept and the robot; without either, whatever
-/// there is. `None`: there is nothing in space.
+/// The ball that the page opens on, and the side that it is seen from: what is to be swept and the
+/// arm's shoulder; without either, whatever there is. `None`: there is nothing in space.
 fn focus(data: &ReportData) -> Option<Value> {
     let surface = |c: &&Cloud| !matches!(c.paint, Paint::Around | Paint::Unseen);
-    let clouds = data.clouds.iter().filter(surface).flat_map(|c| &c.points);
-    let robot = |s: &&Shape| !matches!(s.look, Look::Obstacle | Look::Ground) && s.body.is_none();
-    let shapes = data.shapes.iter().filter(robot).flat_map(|s| &s.vertices);
-    let lines = data.lines.iter().flat_map(|l| &l.lines).flatten();
-    let (low, high) = bounds(clouds.chain(shapes))
-        .or_else(|| bounds(data.clouds.iter().flat_map(|c| &c.points)))
-        .or_else(|| bounds(lines))
-        .or_else(|| {
-            let reach = Vector3::repeat(0.8);
-            let middle = Point3::new(0.0, 0.0, 0.6);
-            (!data.bodies.is_empty()).then_some((middle - reach, middle + reach))
-        })?;
+    let surface: Vec<_> =
+        data.clouds.iter().filter(surface).flat_map(|c| &c.points).copied().collect();
+    let swept = bounds(&surface);
+    let shoulder = data.bodies.first().map(|body| Point3::from(body.rest.translation.vector));
+    let everything = || data.clouds.iter().flat_map(|c| &c.points);
+    let lines = || data.lines.iter().flat_map(|l| &l.lines).flatten();
+    let (low, high) = match (swept, shoulder) {
+        (Some(_), shoulder) => bounds(surface.iter().chain(&shoulder))?,
+        (None, Some(shoulder)) => {
+            let reach = Vector3::repeat(0.7);
+            (shoulder - reach, shoulder + reach)
+        }
+        (None, None) => bounds(everything()).or_else(|| bounds(lines()))?,
+    };
     let middle = nalgebra::center(&low, &high);
-    Some(json!({ "at": at(&middle), "radius": (0.5 * (high - low).norm()).max(0.05) }))
+    // Aslant from ahead, on the arm's side.
+    let ahead = swept.map_or(0.0, |(low, high)| {
+        let surface = nalgebra::center(&low, &high);
+        surface.y.atan2(surface.x)
+    });
+    let side = if shoulder.is_some_and(|s| s.y > 0.0) { 1.0 } else { -1.0 };
+    Some(json!({
+        "at": at(&middle),
+        "radius": (0.5 * (high - low).norm()).max(0.05),
+        "turn": if data.bodies.is_empty() { -2.2 } else { ahead + side * ASIDE },
+    }))
 }

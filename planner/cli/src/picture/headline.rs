@@ -5,9 +5,9 @@ use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Headline, Look, Motion, Tone};
 
-use super::Sitter;
 use super::points::Points;
 use super::robot::Shown;
+use super::sitter::Sitter;
 
 /// Share of the reachable points that is well swept.
 const WELL: f64 = 0.95;

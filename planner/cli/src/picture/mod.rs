@@ -4,34 +4,17 @@ mod headline;
 mod motion;
 mod points;
 mod robot;
+mod sitter;
 
 use anyhow::ensure;
-use nullsweep_collision::Options;
-use nullsweep_planner::plan::Plan;
-use nullsweep_planner::verify::Verification;
-use nullsweep_planner::workcell::Scene;
-use nullsweep_report::{JointAxis, LineSet, ReportData, Table};
-use nullsweep_robot::{Arm, Robot};
+use nullsweep_report::{JointAxis, ReportData};
+use nullsweep_robot::Arm;
 
 use headline::headline;
 use motion::motions;
 use points::Points;
 
-/// What a page is made of.
-pub(super) struct Sitter<'a> {
-    /// Plans as they follow each other; the last one's scan, figures and stance are shown.
-    pub(super) plans: &'a [Plan],
-    pub(super) robot: &'a Robot,
-    /// The arm in the plans' stance.
-    pub(super) arm: &'a Arm,
-    pub(super) collision: &'a Options,
-    /// What is there, in the floor frame, if that is known.
-    pub(super) scene: Option<&'a Scene>,
-    /// What the last plan's check found, if it was checked.
-    pub(super) verification: Option<&'a Verification>,
-    pub(super) tables: Vec<Table>,
-    pub(super) lines: Vec<LineSet>,
-}
+pub(super) use sitter::Sitter;
 
 /// The page of some plans.
 pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {

@@ -9,7 +9,7 @@ use nullsweep_report::{Motion, Probe, Series};
 use nullsweep_robot::Arm;
 use rayon::prelude::*;
 
-use super::Sitter;
+use super::sitter::Sitter;
 
 /// At how many times of a plan the clearance is looked for.
 const CLEARANCES: usize = 240;
@@ -89,7 +89,7 @@ fn press(plan: &Plan, arm: &Arm, scene: &Scene) -> Series {
         values[k] = depth * 1e3;
     }
     let times = plan.knots.iter().map(|k| k.time_ns as f64 * 1e-9).collect();
-    Series { name: "press".into(), unit: "mm", times, values }
+    Series { name: "press".into(), unit: "mm", times, values, most: None }
 }
 
 /// Clearance of arm and hand at some times.
@@ -102,6 +102,12 @@ fn clearances(plan: &Plan, exact: &Exact) -> [Series; 2] {
         found.iter().map(|c| of(c) * 1e3).collect()
     };
     [("clearance, arm", mm(|c| c.arm)), ("clearance, hand", mm(|c| c.hand))].map(
-        |(name, values)| Series { name: name.into(), unit: "mm", times: times.clone(), values },
+        |(name, values)| Series {
+            name: name.into(),
+            unit: "mm",
+            times: times.clone(),
+            values,
+            most: Some(REACH * 1e3),
+        },
     )
 }

@@ -5,7 +5,7 @@ use nullsweep_collision::{Figure, ObstacleShape};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Body, Look, PadCentre, Shape};
 
-use super::Sitter;
+use super::sitter::Sitter;
 
 /// How far the drawn piece of the floor reaches beyond what is there. \[m\]
 const AROUND: f64 = 0.4;
