@@ -24,11 +24,11 @@ mod scene_file;
 mod table;
 mod task;
 mod verify;
+mod view;
 mod views;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
 pub use exit::{FAILED, LOST, OK, USAGE, VIOLATIONS};
-pub use picture::{joint_axes, motion};
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -57,6 +57,8 @@ enum Command {
     Task(Box<task::TaskArgs>),
     /// Check a plan file against the scene that it was made for.
     Verify(Box<verify::VerifyArgs>),
+    /// Show plans, scans and scenes in a browser: the arm moving, what is swept and what is left.
+    View(Box<view::ViewArgs>),
     /// Send a plan to the executor.
     Publish(publish::PublishArgs),
     /// Replace the plan that runs by one for what it has not swept yet, without a stop.
@@ -85,6 +87,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Scene(args) => scene_command::run(&args),
         Command::Task(args) => task::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Publish(args) => publish::run(&args),
         Command::Replan(args) => replan::run(&args),
         Command::Gtsp(args) => gtsp::run(&args, &mut std::io::stdout().lock())

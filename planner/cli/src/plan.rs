@@ -13,6 +13,7 @@ use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::verify::Verification;
+use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_report as report;
 use nullsweep_robot::{JointVector, MAX_DOF, Robot, Tool};
@@ -23,7 +24,7 @@ use crate::choices::{CostArg, MethodArg, ProfileArg};
 use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::{Numbers, finite, not_negative, positive, velocity};
-use crate::picture::picture;
+use crate::picture::{Sitter, picture};
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
@@ -110,7 +111,7 @@ pub(super) struct PlanArgs {
     /// Write every figure of the run as JSON to a file, or `-`.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a page with pictures of scan, graph, tool path and joints.
+    /// Write a page that shows the arm moving along the plan, what it sweeps and what is left.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }
@@ -188,7 +189,7 @@ pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8,
     let outcome = pipeline::run(&robot, &scene, &job, &bars);
     bars.clear();
     let outcome = outcome?;
-    Ok((finish(args, &outcome)?, outcome.plan))
+    Ok((finish(args, &robot, &scene, &outcome)?, outcome.plan))
 }
 
 impl PlanArgs {
@@ -200,13 +201,28 @@ impl PlanArgs {
 }
 
 /// Writes what was asked for and prints the table.
-fn finish(args: &PlanArgs, outcome: &Outcome) -> anyhow::Result<u8> {
+fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> anyhow::Result<u8> {
     let figures = &outcome.figures;
     if let Some(path) = &args.json {
         write_json(figures, path)?;
     }
     if let Some(path) = &args.report {
-        report::write(path, &picture(outcome, figures_table(figures)))?;
+        let edges = outcome.graph.edges.iter();
+        let data = picture(Sitter {
+            plans: std::slice::from_ref(&outcome.plan),
+            robot,
+            arm: &outcome.arm,
+            collision: &args.robot.collision(),
+            scene: Some(scene),
+            verification: Some(&figures.verification),
+            tables: vec![figures_table(figures)],
+            lines: vec![report::LineSet {
+                name: "graph".into(),
+                lines: edges.map(|e| e.line.iter().map(|s| s.point).collect()).collect(),
+                shown: false,
+            }],
+        })?;
+        report::write(path, &data)?;
     }
     let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
     if !to_stdout {

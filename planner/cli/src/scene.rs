@@ -44,6 +44,11 @@ impl SceneArgs {
         let object = if chosen { self.object } else { Some(ObjectChoice::At(point)) };
         Self { object, ..self.clone() }
     }
+
+    /// How the scans stand.
+    pub(super) fn placed(&self) -> &PlacedArgs {
+        &self.placed
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

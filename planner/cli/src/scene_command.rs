@@ -7,7 +7,7 @@ use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nalgebra::Point3;
 use nullsweep_planner::progress::Progress;
-use nullsweep_report::{self as report, RoomData};
+use nullsweep_report::{self as report, Cloud, LineSet, Paint, Place, PlaceGroup, ReportData};
 use nullsweep_surface::PlacedScan;
 use nullsweep_surface::room::Room;
 
@@ -44,17 +44,16 @@ pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     bars.stage("planes and objects", None);
     let room = Room::find(scan, args.seed);
     bars.clear();
-    let rows = rows(&room);
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED).set_header(COLUMNS);
-    table.add_rows(&rows);
+    table.add_rows(rows(&room));
     println!("{table}");
     if let Some(path) = &args.out {
         SceneFile::of(path, &args.placed, &args.scans, &found, &room, args.seed)?.write(path)?;
         println!("scene: {}", path.display());
     }
     if let Some(path) = &args.report {
-        report::write_room(path, &picture(&args.scans, scan, &room, rows))?;
+        report::write(path, &picture(&args.scans, scan, &room))?;
         println!("report: {}", path.display());
     }
     Ok(OK)
@@ -89,10 +88,12 @@ fn rows(room: &Room) -> Vec<Vec<String>> {
     planes.chain(objects).collect()
 }
 
-fn picture(scans: &[PathBuf], scan: &PlacedScan, room: &Room, rows: Vec<Vec<String>>) -> RoomData {
+/// The page of a room: its planes and objects by number.
+pub(super) fn picture(scans: &[PathBuf], scan: &PlacedScan, room: &Room) -> ReportData {
     let mut taken: Vec<Vec<bool>> =
         scan.views.iter().map(|view| vec![false; view.points.len()]).collect();
     let mut clouds = Vec::new();
+    let mut objects = Vec::new();
     for (i, segment) in room.segments.iter().enumerate() {
         let mut points = Vec::with_capacity(segment.points);
         for (v, members) in segment.members.iter().enumerate() {
@@ -101,24 +102,40 @@ fn picture(scans: &[PathBuf], scan: &PlacedScan, room: &Room, rows: Vec<Vec<Stri
                 taken[v][member as usize] = true;
             }
         }
-        clouds.push((format!("object {}", i + 1), points));
+        let name = format!("object {}", i + 1);
+        objects.push(Place {
+            label: format!("{name}: {} points", segment.points),
+            at: segment.centre,
+            radius: 0.5 * (segment.bounds.max - segment.bounds.min).norm(),
+            normal: None,
+        });
+        clouds.push(Cloud { name, paint: Paint::Numbered(i), points, shown: true });
     }
     let all = scan.views.iter().zip(&taken).flat_map(|(view, taken)| view.points.iter().zip(taken));
-    let rest = all.filter(|(_, taken)| !**taken).map(|(point, _)| *point);
-    clouds.push(("planes and all else".into(), rest.collect()));
-    let outline = |(i, plane): (usize, &nullsweep_surface::room::Plane)| {
-        (format!("plane {}: {}", i + 1, name(plane.kind)), plane.outline.clone())
-    };
+    let points = all.filter(|(_, taken)| !**taken).map(|(point, _)| *point).collect();
+    clouds.push(Cloud { name: "all else".into(), paint: Paint::Around, points, shown: true });
+    let mut planes = Vec::new();
+    let mut lines = Vec::new();
+    for (i, plane) in room.planes.iter().enumerate() {
+        let label = format!("plane {}: {}, {:.2} m\u{b2}", i + 1, name(plane.kind), plane.area);
+        let radius = plane.outline.iter().map(|p| (p - plane.point).norm()).fold(0.0, f64::max);
+        planes.push(Place { label, at: plane.point, radius, normal: None });
+        lines.push(plane.outline.iter().chain(plane.outline.first()).copied().collect());
+    }
     let files: Vec<String> = scans.iter().map(|path| path.display().to_string()).collect();
-    RoomData {
+    let group =
+        |name: &str, items| PlaceGroup { name: name.into(), items, ..PlaceGroup::default() };
+    ReportData {
         title: "Nullsweep scene".into(),
         subtitle: files.join(", "),
+        places: vec![group("Objects", objects), group("Planes", planes)],
         tables: vec![report::Table {
             title: "Planes and objects".into(),
             columns: COLUMNS.map(Into::into).into(),
-            rows,
+            rows: rows(room),
         }],
         clouds,
-        outlines: room.planes.iter().enumerate().map(outline).collect(),
+        lines: vec![LineSet { name: "outlines of planes".into(), lines, shown: true }],
+        ..ReportData::default()
     }
 }

@@ -58,6 +58,14 @@ impl Exact {
         &self.scene
     }
 
+    pub(crate) fn arm(&self) -> &Arm {
+        &self.arm
+    }
+
+    pub(crate) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
     /// Whether everything keeps its margin at the joint vector `q`. \[rad\] or \[m\] One with NaN or ∞
     /// is not free.
     #[must_use]
@@ -174,7 +182,7 @@ fn breaks(distance: f64, margin: f64) -> bool {
 }
 
 /// Distance from a shape to a point of the root frame, negative inside. \[m\]
-fn signed_distance(shape: &dyn Shape, at: &Pose, p: &Point3<f64>) -> f64 {
+pub(crate) fn signed_distance(shape: &dyn Shape, at: &Pose, p: &Point3<f64>) -> f64 {
     let projection = shape.project_point(at, Vec3::new(p.x, p.y, p.z), false);
     let distance = (projection.point - Vec3::new(p.x, p.y, p.z)).length();
     if projection.is_inside { -distance } else { distance }

@@ -36,9 +36,11 @@
 
 mod bodies;
 mod check;
+mod clearance;
 mod error;
 mod exact;
 mod field;
+mod figure;
 mod fixed;
 mod frame;
 mod mesh;
@@ -63,8 +65,10 @@ mod tests;
 mod tree;
 mod world;
 
+pub use clearance::Clearance;
 pub use error::CollisionError;
 pub use exact::Exact;
+pub use figure::{Figure, FigureBody, FigureShape, Triangles};
 pub use mesh::{MeshError, MeshPaths};
 pub use obstacle::{Obstacle, ObstacleShape};
 pub use options::{Attached, Options};

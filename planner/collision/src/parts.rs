@@ -24,6 +24,8 @@ pub(crate) struct Part {
     pub(crate) origin: Isometry3<f64>,
     /// The tool's pad, which may touch the scan.
     pub(crate) is_pad: bool,
+    /// Made up for a shape that is missing.
+    pub(crate) is_guessed: bool,
 }
 
 /// Shortest distance between two joints that gets a capsule instead of a ball. \[m\]
@@ -33,7 +35,7 @@ impl Part {
     /// Of a link, or of the tip frame; not the pad.
     fn new(link: Option<usize>, name: &str, solid: Solid, origin: Isometry3<f64>) -> Self {
         let shape = solid.to_parry();
-        Self { link, name: name.to_owned(), solid, shape, origin, is_pad: false }
+        Self { link, name: name.to_owned(), solid, shape, origin, is_pad: false, is_guessed: false }
     }
 }
 
@@ -109,7 +111,10 @@ pub(crate) fn collect(
 /// Capsules from a link's origin to the joints of its children; a ball at the origin where
 /// `always` and there is no child at a distance.
 fn fit(robot: &Robot, link: usize, radius: f64, always: bool) -> Vec<Part> {
-    let part = |origin, solid| Part::new(Some(link), &robot.links()[link].name, solid, origin);
+    let part = |origin, solid| {
+        let part = Part::new(Some(link), &robot.links()[link].name, solid, origin);
+        Part { is_guessed: true, ..part }
+    };
     let mut parts: Vec<Part> = robot
         .joints()
         .iter()

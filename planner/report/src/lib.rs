@@ -1,17 +1,18 @@
 //! The report of a run: one HTML page that opens without a network.
 //!
-//! It shows the scan with what was swept, the patches with their normals and the reason of those
-//! that cannot be reached, the graph, the path of the tool in contact and through the air, every
-//! joint over time between its limits, and tables of figures. A second plan and measured motions
-//! can stand beside the first. [`ReportData`] is plain vectors, so whoever has a plan or a
-//! recording can fill it.
+//! It opens on the figures that matter and, beside them, the scene in space: the robot's shapes
+//! moving along the plan's time, the tool's path, the scan by what was swept, what is in the way.
+//! A list says what is left and why, and flies there; joints, velocities and other quantities run
+//! under it. [`ReportData`] is plain vectors, so whoever has a plan or a recording can fill it. The
+//! page's script (`assets/`) is our own: WebGL 2 and a canvas, no library.
 //!
 //! ```
 //! use nullsweep_report::{JointAxis, Motion, ReportData, render};
 //!
+//! let limits = Some((-2.0, 2.0));
 //! let data = ReportData {
 //!     title: "One joint".into(),
-//!     joints: vec![JointAxis { name: "elbow".into(), limits: Some((-2.0, 2.0)) }],
+//!     joints: vec![JointAxis { name: "elbow".into(), unit: "rad", limits }],
 //!     plans: vec![Motion {
 //!         name: "plan".into(),
 //!         times: vec![0.0, 1.0],
@@ -20,17 +21,18 @@
 //!     }],
 //!     ..ReportData::default()
 //! };
-//! assert!(render(&data)?.contains("Joints over time"));
+//! assert!(render(&data)?.contains("One joint"));
 //! # Ok::<(), nullsweep_report::ReportError>(())
 //! ```
 
 mod data;
-mod joints;
+mod left;
 mod page;
-mod room;
-mod scene;
-mod style;
+mod wire;
 
-pub use data::{JointAxis, Motion, PatchMark, ReportData, ReportError, Table};
+pub use data::{
+    Body, Cloud, Headline, JointAxis, LineSet, Look, Motion, PadCentre, Paint, Place, PlaceGroup,
+    Probe, ReportData, ReportError, Series, Shape, Table, Tone,
+};
+pub use left::{LeftPoint, places};
 pub use page::{render, write};
-pub use room::{RoomData, write_room};

@@ -16,5 +16,5 @@ mod press;
 mod violation;
 
 pub use gate::{Against, Given, Verification, VerifyError, verify};
-pub use press::Press;
+pub use press::{Press, press_depths};
 pub use violation::{Violation, ViolationKind};

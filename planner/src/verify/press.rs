@@ -41,8 +41,15 @@ struct Contact {
     touching: f64,
 }
 
+/// How deep the deepest point in the pad's rectangle lies behind its plane, at each of the pad poses
+/// (contact frame, in the scene's frame). \[m\]
+#[must_use]
+pub fn press_depths(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Vec<f64> {
+    contacts(scene, poses, tool).iter().map(|contact| contact.press).collect()
+}
+
 /// Looks at pad poses (contact frame, in the scene's frame).
-pub(super) fn press(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Press {
+fn contacts(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Vec<Contact> {
     let surface = &scene.surface;
     let points: Vec<Point3<f64>> =
         surface.points.iter().chain(&scene.surroundings).copied().collect();
@@ -70,7 +77,12 @@ pub(super) fn press(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Pre
         let facing = nearest.1.map_or(0.0, |n| (-n.dot(&axis)).clamp(-1.0, 1.0).acos());
         Contact { press: deepest, facing, touching: touched as f64 / under.max(1) as f64 }
     };
-    let contacts: Vec<Contact> = poses.par_iter().map(look).collect();
+    poses.par_iter().map(look).collect()
+}
+
+/// The figures over all of the pad poses.
+pub(super) fn press(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Press {
+    let contacts = contacts(scene, poses, tool);
     let sorted = |of: fn(&Contact) -> f64| {
         let mut values: Vec<f64> = contacts.iter().map(of).collect();
         values.sort_by(f64::total_cmp);

@@ -121,8 +121,8 @@ const PLANNER: &[(&str, &[&str])] = &[
 #[rustfmt::skip]
 const COLLISION: &[&str] = &[
     "frame", "rules", "points", "tree", "mesh", "srdf", "error", "options", "obstacle",
-    "solid", "spheres", "sieve", "field", "bodies", "parts", "shapes", "pairs", "scene", "exact",
-    "fixed", "moving", "motion", "never", "world", "check", "proof",
+    "solid", "spheres", "sieve", "field", "bodies", "parts", "figure", "shapes", "pairs", "scene",
+    "exact", "clearance", "fixed", "moving", "motion", "never", "world", "check", "proof",
 ];
 
 const SURFACE: &[&str] =
@@ -144,7 +144,7 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("clap", &["planner/cli", "executor", "tests", "pr2-bridge"]),
     ("ratatui", &["executor/src/top"]),
     ("indicatif", &["planner/cli"]),
-    ("plotly", &["planner/report", "tests"]),
+    ("plotly", &["tests"]),
     ("plotters", &["planner/experiment"]),
     ("comfy-table", &["planner/cli", "planner/experiment", "tests"]),
 ];

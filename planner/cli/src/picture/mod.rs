@@ -1,0 +1,74 @@
+//! What a plan looks like: the data of its page.
+
+mod headline;
+mod motion;
+mod points;
+mod robot;
+mod sitter;
+
+use anyhow::ensure;
+use nullsweep_report::{JointAxis, ReportData};
+use nullsweep_robot::Arm;
+
+use headline::headline;
+use motion::motions;
+use points::Points;
+
+pub(super) use sitter::Sitter;
+
+/// The page of some plans.
+pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
+    let Some(plan) = sitter.plans.last() else { return Ok(ReportData::default()) };
+    for other in sitter.plans {
+        ensure!(
+            other.base == plan.base && other.joints == plan.joints && other.held == plan.held,
+            "the plans are not of one stance: the robot stands at {:?} in one, at {:?} in another, \
+             or other joints are moved or held",
+            other.base,
+            plan.base
+        );
+    }
+    let here = sitter.scene.map(|scene| scene.transformed(&plan.base_pose().inverse()));
+    let points = Points::of(plan, sitter.arm, here.as_ref(), sitter.verification);
+    let robot = robot::shapes(&sitter, here.as_ref())?;
+    let plans = motions(&sitter, here.as_ref())?;
+    let (headline, notes) = headline(&sitter, here.as_ref(), &points, &plans, &robot);
+    Ok(ReportData {
+        title: "Nullsweep coverage plan".into(),
+        subtitle: format!(
+            "{}, {} … {}, {:?} minimising {:?}, seed {}",
+            plan.robot,
+            plan.joints.first().map_or("", String::as_str),
+            plan.joints.last().map_or("", String::as_str),
+            plan.method,
+            plan.cost,
+            plan.seed
+        ),
+        headline,
+        notes,
+        tables: sitter.tables,
+        places: points.places,
+        clouds: points.clouds,
+        spacing: here.as_ref().map_or(0.0, |scene| scene.surface.spacing),
+        lines: sitter.lines,
+        shapes: robot.shapes,
+        bodies: robot.bodies,
+        pad: Some(robot.pad),
+        joints: joint_axes(sitter.arm),
+        plans,
+        measured: Vec::new(),
+    })
+}
+
+/// The arm's joints with their soft limits.
+fn joint_axes(arm: &Arm) -> Vec<JointAxis> {
+    let axis = |(j, name): (usize, &String)| {
+        let limits = &arm.limits()[j];
+        JointAxis {
+            name: name.clone(),
+            unit: if arm.is_revolute(j) { "rad" } else { "m" },
+            limits: (!limits.continuous).then_some((limits.lower, limits.upper)),
+        }
+    };
+    arm.joint_names().iter().enumerate().map(axis).collect()
+}

@@ -1,0 +1,114 @@
+//! The scan by what was swept, and what is left by cause and place.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use nullsweep_planner::plan::{Plan, Stretch};
+use nullsweep_planner::sweep::coverage;
+use nullsweep_planner::verify::Verification;
+use nullsweep_planner::workcell::Scene;
+use nullsweep_report::{Cloud, LeftPoint, Paint, PlaceGroup, places};
+use nullsweep_robot::Arm;
+use nullsweep_surface::Scan;
+
+/// Why a point may be left.
+const CAUSES: [&str; 3] = [
+    "No arm pose free of collision touches it",
+    "Reachable, but no motion was found that leads there",
+    "Beside the path: the pad passes near, but not over it",
+];
+
+/// What is known of a plan's points.
+pub(super) struct Points {
+    pub(super) clouds: Vec<Cloud>,
+    pub(super) places: Vec<PlaceGroup>,
+    /// How many there are.
+    pub(super) all: usize,
+    /// How many are left.
+    pub(super) left: usize,
+    /// Shares of swept points: of those that are reachable, of all; `None`: there are none.
+    pub(super) shares: [Option<f64>; 2],
+}
+
+impl Points {
+    /// Those of a plan, with what else is there, in the root frame.
+    pub(super) fn of(
+        plan: &Plan,
+        arm: &Arm,
+        here: Option<&Scene>,
+        verification: Option<&Verification>,
+    ) -> Self {
+        let scan = surface(plan);
+        let swept = match verification {
+            Some(found) if found.swept.len() == scan.points.len() => found.swept.clone(),
+            _ => {
+                let past = plan.past.iter().map(Stretch::trajectory);
+                coverage::swept_by(&scan, past.chain([plan.trajectory()]), arm)
+            }
+        };
+        let cause = causes(plan);
+        let left: Vec<LeftPoint> = (0..swept.len())
+            .filter(|i| !swept[*i])
+            .map(|i| LeftPoint { at: scan.points[i], normal: scan.normals[i], cause: cause(i) })
+            .collect();
+        let some = |want: bool| {
+            let all = scan.points.iter().zip(&swept);
+            all.filter(|(_, s)| **s == want).map(|(p, _)| *p).collect()
+        };
+        let cloud = |name: &str, paint, points: Vec<Point3<f64>>| Cloud {
+            name: name.into(),
+            paint,
+            points,
+            shown: true,
+        };
+        let mut clouds =
+            vec![cloud("swept", Paint::Swept, some(true)), cloud("left", Paint::Left, some(false))];
+        if let Some(scene) = here {
+            clouds.push(cloud("around", Paint::Around, scene.surroundings.clone()));
+            let unseen = cloud("unseen space", Paint::Unseen, scene.unseen.clone());
+            clouds.push(Cloud { shown: false, ..unseen });
+        }
+        let share = |of: &dyn Fn(usize) -> bool| {
+            let all = (0..swept.len()).filter(|i| of(*i)).count();
+            let hit = (0..swept.len()).filter(|i| of(*i) && swept[*i]).count();
+            (all > 0).then(|| hit as f64 / all as f64)
+        };
+        Self {
+            clouds,
+            places: places(&CAUSES.map(str::to_owned), &left, swept.len()),
+            all: swept.len(),
+            left: left.len(),
+            shares: [share(&|i| plan.surface[i].reachable), share(&|_| true)],
+        }
+    }
+}
+
+/// The points that the plan is to sweep.
+fn surface(plan: &Plan) -> Scan {
+    let normal = |n: [f64; 3]| UnitVector3::new_normalize(Vector3::from(n));
+    Scan {
+        points: plan.surface.iter().map(|s| Point3::from(s.point)).collect(),
+        normals: plan.surface.iter().map(|s| normal(s.normal)).collect(),
+        raw: Vec::new(),
+        spacing: 0.0,
+    }
+}
+
+/// For a point of a plan that is left: which of [`CAUSES`].
+fn causes(plan: &Plan) -> impl Fn(usize) -> usize {
+    let mut visited = vec![false; plan.patches.len()];
+    let stretches = plan.past.iter().map(|s| &s.knots).chain([&plan.knots]);
+    for patch in stretches.flatten().filter_map(|knot| knot.patch) {
+        if let Some(seen) = visited.get_mut(patch as usize) {
+            *seen = true;
+        }
+    }
+    move |i| {
+        let sample = &plan.surface[i];
+        if !sample.reachable {
+            return 0;
+        }
+        let at = Point3::from(sample.point);
+        let away = |p: usize| (Point3::from(plan.patches[p]) - at).norm_squared();
+        let nearest = (0..visited.len()).min_by(|a, b| away(*a).total_cmp(&away(*b)));
+        if nearest.is_some_and(|p| visited[p]) { 2 } else { 1 }
+    }
+}

@@ -1,0 +1,171 @@
+//! `planner view`.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+use nullsweep_planner::plan::Plan;
+use nullsweep_planner::progress::Progress;
+use nullsweep_planner::verify::{Given, Verification, verify};
+use nullsweep_report::{self as report, ReportData, Table};
+use nullsweep_robot::{Arm, Robot};
+use nullsweep_surface::room::Room;
+
+use crate::bars::Bars;
+use crate::exit::OK;
+use crate::picture::{Sitter, picture};
+use crate::placed::{Gravity, read_scans};
+use crate::plan::verified_rows;
+use crate::robot::RobotArgs;
+use crate::scene::{Demo, SceneArgs, scene};
+use crate::scene_command;
+
+#[derive(Debug, Args)]
+pub(super) struct ViewArgs {
+    /// Plan files, in the order in which one takes over from another, and the scan files that they
+    /// were made for (or the scene file), given as they were to `plan`; scans or a scene file alone show
+    /// planes and objects.
+    #[arg(required_unless_present = "demo")]
+    files: Vec<PathBuf>,
+    /// The plans were made for a simulated scan.
+    #[arg(long, value_enum)]
+    demo: Option<Demo>,
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// Seed of the simulated scan, or of the points laid on a mesh; without it the plan's, or 1.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Where the page is written; without it beside the first file, its name with `.html` behind.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Only write the page, open nothing.
+    #[arg(long)]
+    no_open: bool,
+}
+
+pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
+    let bars = Bars::new();
+    let (plans, scans): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        args.files.iter().partition(|file| is_plan(file));
+    let scans: Vec<PathBuf> = scans.into_iter().cloned().collect();
+    ensure!(
+        args.demo.is_none() || scans.is_empty(),
+        "{}: a scan beside --demo: the scene is one or the other",
+        scans.first().map_or_else(String::new, |scan| scan.display().to_string())
+    );
+    let plans = plans.into_iter().map(|file| Plan::read(file)).collect::<Result<Vec<_>, _>>()?;
+    let data = if plans.is_empty() {
+        ensure!(args.demo.is_none(), "--demo says what a plan was made for: name the plan's file");
+        let seed = args.seed.unwrap_or(1);
+        let scan = read_scans(args.scene.placed(), &scans, seed, Gravity::Found, &bars)?.scan;
+        scene_command::picture(&scans, &scan, &Room::find(&scan, seed))
+    } else {
+        of_plans(args, &plans, &scans, &bars)?
+    };
+    bars.clear();
+    let out = args.out.clone().unwrap_or_else(|| beside(args.files.first()));
+    report::write(&out, &data)?;
+    println!("page: {}", out.display());
+    if !args.no_open {
+        open(&out);
+    }
+    Ok(OK)
+}
+
+/// The page of plans, in their scene if that is given.
+fn of_plans(
+    args: &ViewArgs,
+    plans: &[Plan],
+    scans: &[PathBuf],
+    bars: &Bars,
+) -> anyhow::Result<ReportData> {
+    let plan = &plans[plans.len() - 1];
+    let robot = args.robot.robot()?;
+    let arm = arm(args, &robot, plan)?;
+    let collision = args.robot.collision();
+    let is_given = args.demo.is_some() || !scans.is_empty();
+    let scene = is_given
+        .then(|| {
+            bars.stage("scan", None);
+            scene(&args.scene, args.demo, scans, args.seed.unwrap_or(plan.seed), bars)
+        })
+        .transpose()?;
+    let verification = match &scene {
+        None => None,
+        Some(scene) => {
+            bars.stage("verify", Some(plan.knots.len()));
+            let given = Given { robot: &robot, arm: arm.spec(), scene, collision: &collision };
+            Some(verify(plan, given, &|| bars.tick())?)
+        }
+    };
+    bars.stage("picture", None);
+    picture(Sitter {
+        plans,
+        robot: &robot,
+        arm: &arm,
+        collision: &collision,
+        scene: scene.as_ref(),
+        verification: verification.as_ref(),
+        tables: verification.as_ref().map(table).into_iter().collect(),
+        lines: Vec::new(),
+    })
+}
+
+fn table(found: &Verification) -> Table {
+    Table {
+        title: "Verified now".into(),
+        columns: vec!["figure".into(), "value".into()],
+        rows: verified_rows(found).into_iter().map(Vec::from).collect(),
+    }
+}
+
+/// The arm that the plan is for, its held joints where the plan holds them.
+fn arm(args: &ViewArgs, robot: &Robot, plan: &Plan) -> anyhow::Result<Arm> {
+    let arm = robot.arm(&args.robot.spec()?)?;
+    if plan.fingerprint != arm.fingerprint() || plan.joints != arm.joint_names() {
+        bail!(
+            "the plan moves {} of {}, the arm given is {} of {}: say which one by --urdf and \
+             --chain, or --arm left",
+            plan.joints.join(", "),
+            plan.robot,
+            arm.joint_names().join(", "),
+            robot.name()
+        );
+    }
+    let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
+    Ok(arm.with_held(&held)?)
+}
+
+/// Whether a file is a plan, by its name: no scan is JSON.
+fn is_plan(file: &Path) -> bool {
+    file.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("json") || e.eq_ignore_ascii_case("plan"))
+}
+
+fn beside(file: Option<&PathBuf>) -> PathBuf {
+    file.map_or_else(|| "view.html".into(), |file| file.with_extension("html"))
+}
+
+/// Opens the page in the user's browser, or says why not.
+fn open(page: &Path) {
+    let has_screen = cfg!(target_os = "macos")
+        || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
+    if !has_screen {
+        println!("there is no screen here: open the page in a browser");
+        return;
+    }
+    let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    let started = Command::new(program)
+        .arg(page)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .with_context(|| format!("{program} cannot be started"));
+    if let Err(error) = started {
+        println!("{error:#}: open the page in a browser");
+    }
+}

@@ -1,0 +1,203 @@
+//! `planner view`: what its pages hold.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, UnitVector3, Vector3};
+use nullsweep_planner::plan::{Continues, Plan, PlanKnot, Profile};
+use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Tool};
+use serde_json::Value;
+
+fn planner(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_planner")).args(args).output().unwrap()
+}
+
+/// A plan of an arm that waves all its joints, each at its own pace.
+fn plan(side: Side, profile: Profile) -> (Plan, Arm) {
+    let robot = Robot::pr2();
+    let arm = robot.arm(&ArmSpec::pr2(side)).unwrap();
+    let arm = arm.with_held(&[("torso_lift_joint", 0.25)]).unwrap();
+    let at = |t: f64| {
+        let (mut q, mut v) = (arm.home(), JointVector::ZERO);
+        for j in 0..arm.dof() {
+            let pace = 0.5 + 0.2 * j as f64;
+            q[j] += 0.2 * (pace * t).sin();
+            v[j] = 0.2 * pace * (pace * t).cos();
+        }
+        (q, v)
+    };
+    let knots = (0..40u64).map(|k| {
+        let (q, v) = at(0.3 * k as f64);
+        let v = if profile == Profile::Acceleration { v } else { JointVector::ZERO };
+        PlanKnot { time_ns: k * 300_000_000, q, v, line: None, patch: None }
+    });
+    let plan = Plan::of(&robot, &arm, &Tool::default(), knots.collect());
+    (Plan { profile, ..plan }, arm)
+}
+
+fn page(folder: &Path, name: &str, args: &[&str]) -> (String, Value) {
+    let out = folder.join(name);
+    let mut all = vec!["view", "--no-open", "--out", out.to_str().unwrap()];
+    all.extend(args);
+    let done = planner(&all);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let text = std::fs::read_to_string(&out).unwrap();
+    let from = text.split_once("id=\"data\">").unwrap().1;
+    let json = serde_json::from_str(from.split_once("</script>").unwrap().0).unwrap();
+    (text, json)
+}
+
+fn write(folder: &Path, name: &str, plan: &Plan) -> PathBuf {
+    let path = folder.join(name);
+    plan.write(&path).unwrap();
+    path
+}
+
+fn floats(value: &Value) -> Vec<f64> {
+    let bytes = STANDARD.decode(value.as_str().unwrap()).unwrap();
+    bytes.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+/// The pad's centre by what the page holds alone, as its script has it.
+fn pad(data: &Value, q: &[f64]) -> Point3<f64> {
+    let mut poses: Vec<Isometry3<f64>> = Vec::new();
+    for body in data["bodies"].as_array().unwrap() {
+        let joint = body["joint"].as_u64().unwrap() as usize;
+        let value = body["factor"].as_f64().unwrap() * q[joint] + body["offset"].as_f64().unwrap();
+        let axis = UnitVector3::new_normalize(Vector3::from_vec(numbers(&body["axis"])));
+        assert!(!body["slides"].as_bool().unwrap(), "the PR2's arms turn");
+        let rest: Isometry3<f64> =
+            nalgebra::try_convert(Matrix4::from_vec(numbers(&body["rest"]))).unwrap();
+        let local = rest
+            * Isometry3::from_parts(
+                Vector3::zeros().into(),
+                UnitQuaternion::from_axis_angle(&axis, value),
+            );
+        let parent = body["parent"].as_u64().map(|p| poses[p as usize]);
+        poses.push(parent.map_or(local, |parent| parent * local));
+    }
+    let body = data["pad"]["body"].as_u64().unwrap() as usize;
+    poses[body] * Point3::from(Vector3::from_vec(numbers(&data["pad"]["centre"])))
+}
+
+#[test]
+fn a_page_moves_the_pad_as_the_arm_moves_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for (side, arm_flag) in [(Side::Left, "left"), (Side::Right, "right")] {
+        for profile in [Profile::Velocity, Profile::Acceleration] {
+            let (plan, arm) = plan(side, profile);
+            let file = write(folder.path(), "plan.json", &plan);
+            let args = [file.to_str().unwrap(), "--arm", arm_flag];
+            let (text, data) = page(folder.path(), "plan.html", &args);
+            assert!(text.len() < 1_000_000, "{} bytes", text.len());
+            for needle in ["http", "src=", "@import", "url("] {
+                assert!(!text.contains(needle), "the page loads {needle}");
+            }
+            let motion = &data["plans"][0];
+            let (times, q) = (floats(&motion["times"]), floats(&motion["q"]));
+            assert_eq!(times.len(), plan.knots.len());
+            assert_eq!(motion["v"].is_null(), profile == Profile::Velocity);
+            let on_arm = plan.tool.on(&arm);
+            for (k, knot) in plan.knots.iter().enumerate() {
+                let found = pad(&data, &q[k * arm.dof()..(k + 1) * arm.dof()]);
+                let error = (found - on_arm.centre(&knot.q)).norm();
+                assert!(error < 1e-5, "knot {k}: the page has the pad {error} m off");
+            }
+            // What the page compares its own motion with is on the executor's curve.
+            let probes = motion["probes"].as_array().unwrap();
+            assert!(probes.len() >= 30);
+            for probe in probes {
+                let time = probe["time"].as_f64().unwrap();
+                let k = times.iter().position(|t| *t > time).unwrap();
+                let curve = plan.curve(k);
+                let share = (time - 0.3 * (k - 1) as f64) / 0.3;
+                let planned = on_arm.centre(&curve.at(share));
+                let found = Point3::from(Vector3::from_vec(numbers(&probe["pad"])));
+                assert!((found - planned).norm() < 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plan_takes_over_from_another_in_its_knot() {
+    let folder = tempfile::tempdir().unwrap();
+    let (first, _) = plan(Side::Right, Profile::Velocity);
+    let mut second = first.clone();
+    second.knots = first.knots[10..].to_vec();
+    let from = second.knots[0].time_ns;
+    second.knots.iter_mut().for_each(|knot| knot.time_ns -= from);
+    second.continues = Some(Continues { digest: first.digest().unwrap(), knot: 10 });
+    let files = [("a.json", &first), ("b.json", &second)]
+        .map(|(name, plan)| write(folder.path(), name, plan));
+    let [a, b] = [0, 1].map(|i| files[i].to_str().unwrap());
+    let starts = |data: &Value| -> Vec<f64> {
+        let plans = data["plans"].as_array().unwrap();
+        plans.iter().map(|m| m["starts_at"].as_f64().unwrap()).collect()
+    };
+    let (text, data) = page(folder.path(), "swap.html", &[a, b]);
+    assert_eq!(starts(&data), [0.0, 3.0]);
+    assert!(text.contains("2 plans, the last takes over at 3.0 s"));
+    // One that does not go on from it comes after its end.
+    second.continues = None;
+    let c = write(folder.path(), "c.json", &second);
+    let (_, data) = page(folder.path(), "after.html", &[a, c.to_str().unwrap()]);
+    assert_eq!(starts(&data), [0.0, first.duration()]);
+}
+
+#[test]
+fn what_is_not_known_is_told_beside_the_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, _) = plan(Side::Right, Profile::Velocity);
+    let file = write(folder.path(), "plan.json", &plan);
+    let (text, _) = page(folder.path(), "raw.html", &[file.to_str().unwrap()]);
+    assert!(text.contains("Unverified: "), "a plan that was never verified");
+    let file = write(folder.path(), "sealed.json", &plan.sealed());
+    let (text, _) = page(folder.path(), "sealed.html", &[file.to_str().unwrap()]);
+    assert!(!text.contains("Unverified: ") && text.contains("The scene is not given"));
+}
+
+#[test]
+fn a_plan_of_another_arm_is_refused_with_what_to_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, _) = plan(Side::Left, Profile::Velocity);
+    let file = write(folder.path(), "left.json", &plan);
+    let out = folder.path().join("left.html");
+    let done =
+        planner(&["view", file.to_str().unwrap(), "--no-open", "--out", out.to_str().unwrap()]);
+    let told = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(1), "{told}");
+    assert!(told.contains("l_shoulder_pan_joint") && told.contains("--arm left"), "{told}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_scan_shows_its_planes_and_objects() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = folder.path().join("scan.xyz");
+    let mut text = String::new();
+    for i in 0..60 {
+        for j in 0..60 {
+            let (x, y) = (0.01 * f64::from(i), 0.01 * f64::from(j));
+            let box_ = (20..35).contains(&i) && (20..35).contains(&j);
+            text += &format!("{x} {y} {}\n", if box_ { 0.12 } else { 0.0 });
+        }
+    }
+    std::fs::write(&scan, text).unwrap();
+    let (text, data) = page(folder.path(), "scene.html", &[scan.to_str().unwrap()]);
+    assert!(text.contains("What is there"));
+    let clouds = data["clouds"].as_array().unwrap();
+    let points: usize = clouds
+        .iter()
+        .map(|c| STANDARD.decode(c["shares"].as_str().unwrap()).unwrap().len() / 6)
+        .sum();
+    assert_eq!(points, 3600, "every point is in one cloud");
+    let groups = data["places"].as_array().unwrap();
+    assert!(groups.iter().any(|g| !g["items"].as_array().unwrap().is_empty()));
+}
