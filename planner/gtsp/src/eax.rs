@@ -9,13 +9,11 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::local::LocalSearch;
+use crate::pieces::{Links, Pieces};
 use crate::search_tour::SearchTour;
 use crate::table::Table;
 
 const NONE: u32 = u32::MAX;
-
-/// Neighbours of every cluster: predecessor and successor; without directions where reversible.
-type Links = Vec<[u32; 2]>;
 
 /// Scratch space of the crossover.
 #[derive(Default)]
@@ -29,10 +27,10 @@ pub(super) struct Crossover {
     ends: Vec<usize>,
     path: Vec<u32>,
     seen: Vec<[u32; 2]>,
+    /// The first parent's links but for those of `touched`, while a child is made.
     child: Links,
-    part: Vec<u32>,
-    parts: Vec<u32>,
     touched: Vec<u32>,
+    pieces: Pieces,
 }
 
 fn links(tour: &SearchTour, into: &mut Links) {
@@ -64,6 +62,7 @@ impl Crossover {
     ) -> usize {
         links(a, &mut self.a);
         links(b, &mut self.b);
+        self.child.clone_from(&self.a);
         self.cycle.clear();
         self.ends.clear();
         if table.reversible {
@@ -76,17 +75,14 @@ impl Crossover {
 
     fn directed_cycles(&mut self) {
         let m = self.a.len();
-        self.part.clear();
-        self.part.resize(m, 0);
+        let mut done = vec![false; m];
         for start in 0..m as u32 {
-            if self.part[start as usize] != 0
-                || self.a[start as usize][1] == self.b[start as usize][1]
-            {
+            if done[start as usize] || self.a[start as usize][1] == self.b[start as usize][1] {
                 continue;
             }
             let mut here = start;
             loop {
-                self.part[here as usize] = 1;
+                done[here as usize] = true;
                 let head = self.a[here as usize][1];
                 self.cycle.push(here);
                 self.cycle.push(head);
@@ -174,7 +170,6 @@ impl Crossover {
     ) {
         let from = if k == 0 { 0 } else { self.ends[k - 1] };
         let cycle = &self.cycle[from..self.ends[k]];
-        self.child.clone_from(&self.a);
         self.touched.clear();
         self.touched.extend_from_slice(cycle);
         if table.reversible {
@@ -195,7 +190,7 @@ impl Crossover {
                 self.child[tail as usize][1] = head;
             }
         }
-        out.chosen.copy_from_slice(&a.chosen);
+        out.copy_from(a);
         for c in &self.touched {
             let c = *c as usize;
             let (mine, other) = (self.child[c], self.b[c]);
@@ -203,78 +198,46 @@ impl Crossover {
                 out.chosen[c] = b.chosen[c];
             }
         }
-        self.patch(table, &out.chosen);
-        self.unroll(table, out);
+        self.patch(table, a, &out.chosen);
+        self.unroll(table, a, out);
+        for c in &self.touched {
+            self.child[*c as usize] = self.a[*c as usize];
+        }
         for c in &self.touched {
             local.push(*c);
         }
         local.run(table, out);
     }
 
-    /// Next cluster when coming from `from`.
-    fn onward(&self, table: &Table, from: u32, at: u32) -> u32 {
-        let slots = self.child[at as usize];
-        if !table.reversible || slots[0] == from { slots[1] } else { slots[0] }
-    }
-
     /// Joins all subtours, smallest first, by the cheapest exchange of two arcs.
-    fn patch(&mut self, table: &Table, chosen: &[u32]) {
-        let m = self.child.len();
-        self.part.clear();
-        self.part.resize(m, NONE);
-        self.parts.clear();
-        for start in 0..m as u32 {
-            if self.part[start as usize] != NONE {
-                continue;
-            }
-            let id = self.parts.len() as u32;
-            let mut size = 0;
-            let (mut from, mut here) = (self.child[start as usize][0], start);
-            while self.part[here as usize] == NONE {
-                self.part[here as usize] = id;
-                size += 1;
-                (from, here) = (here, self.onward(table, from, here));
-            }
-            self.parts.push(size);
-        }
+    fn patch(&mut self, table: &Table, a: &SearchTour, chosen: &[u32]) {
+        self.pieces.cut(a, &self.child, &self.touched);
+        self.pieces.number_parts(a, &self.child, table.reversible);
         let d = |x: u32, y: u32| i64::from(table.d(x, chosen[x as usize], y, chosen[y as usize]));
-        let mut left = self.parts.len();
-        while left > 1 {
-            let smallest = (0..self.parts.len()).filter(|&k| self.parts[k] > 0);
-            let id = smallest.min_by_key(|&k| self.parts[k]).unwrap_or(0) as u32;
+        let mut clusters = Vec::new();
+        while let Some(id) = self.pieces.smallest_part() {
+            clusters.clear();
+            self.pieces.clusters_of(id, a, &mut clusters);
+            clusters.sort_unstable();
             let mut best = (i64::MAX, [NONE; 4]);
-            for all in [false, true] {
-                for x in 0..m as u32 {
-                    if self.part[x as usize] != id {
-                        continue;
-                    }
-                    if all {
-                        for n in 0..m as u32 {
-                            self.try_patch(table, &d, x, n, &mut best);
-                        }
-                    } else {
-                        for (n, _) in table.near_out(x) {
-                            self.try_patch(table, &d, x, n, &mut best);
-                        }
-                    }
+            for &x in &clusters {
+                for (n, _) in table.near_out(x) {
+                    self.try_patch(table, a, &d, (id, x, n), &mut best);
                 }
-                if best.0 < i64::MAX {
-                    break;
+            }
+            if best.0 == i64::MAX {
+                for &x in &clusters {
+                    for n in 0..table.m as u32 {
+                        self.try_patch(table, a, &d, (id, x, n), &mut best);
+                    }
                 }
             }
             // x–y and u–v become x–u and y–v; directed: x→y, v→u become x→u, v→y.
             let [x, y, u, v] = best.1;
             replace_arc(&mut self.child, table.reversible, x, y, u, v);
-            self.touched.extend_from_slice(&[x, y, u, v]);
-            let other = self.part[u as usize];
-            for p in &mut self.part {
-                if *p == id {
-                    *p = other;
-                }
-            }
-            self.parts[other as usize] += self.parts[id as usize];
-            self.parts[id as usize] = 0;
-            left -= 1;
+            self.touched.extend_from_slice(&best.1);
+            self.pieces.join(id, self.pieces.part_of(a, u));
+            self.pieces.cut(a, &self.child, &best.1);
         }
     }
 
@@ -282,12 +245,12 @@ impl Crossover {
     fn try_patch(
         &self,
         table: &Table,
+        a: &SearchTour,
         d: &impl Fn(u32, u32) -> i64,
-        x: u32,
-        u: u32,
+        (id, x, u): (u32, u32, u32),
         best: &mut (i64, [u32; 4]),
     ) {
-        if self.part[u as usize] == self.part[x as usize] {
+        if self.pieces.part_of(a, u) == id {
             return;
         }
         if table.reversible {
@@ -308,19 +271,22 @@ impl Crossover {
         }
     }
 
-    /// The order from the root on, in the cheaper direction.
-    fn unroll(&self, table: &Table, out: &mut SearchTour) {
+    /// The order from the root on, in the cheaper direction; what is as in the first parent, of
+    /// which `out` is a copy, is taken over.
+    fn unroll(&self, table: &Table, a: &SearchTour, out: &mut SearchTour) {
+        let mut to = 0;
+        self.pieces.walk(a, &self.child, table.reversible, 0, |from, last, forward| {
+            out.take_stretch(a, (from, last), forward, to);
+            to += last + 1 - from;
+        });
+        debug_assert_eq!(to, a.order.len());
         let root = table.root as u32;
         let [x, y] = self.child[root as usize];
         let d = |x: u32, y: u32| table.d(x, out.chosen[x as usize], y, out.chosen[y as usize]);
-        let backwards = table.reversible && d(root, x) + d(y, root) < d(root, y) + d(x, root);
-        let (mut from, mut here) = if backwards { (y, root) } else { (x, root) };
-        for p in 0..out.order.len() {
-            out.order[p] = here;
-            out.position[here as usize] = p as u32;
-            (from, here) = (here, self.onward(table, from, here));
+        if table.reversible && d(root, x) + d(y, root) < d(root, y) + d(x, root) {
+            out.reverse(1, to - 1);
         }
-        out.refresh_all(table);
+        out.refresh_around(table, self.touched.iter().chain([&root]));
     }
 }
 

@@ -1,14 +1,22 @@
 //! The instance as the search sees it: with a root cluster, large entries that mean "no arc" taken
 //! for jumps, and only as many cost blocks as there is room for.
 
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
 use crate::instance::{Ends, Instance, Jump};
 
 /// Where the largest entry makes up at least this share of all, it stands for "no arc".
 const BIG_M_SHARE: f64 = 0.3;
 /// Entries of cost blocks that the search keeps, 4 bytes each.
 const ROOM: usize = 1 << 28;
+/// Clusters whose pairs are all listed, at some 20 bytes each.
+const MOST_CLUSTERS: usize = 2000;
 /// Neighbours of each cluster whose blocks are kept where all would not fit.
 const KEPT: usize = 24;
+/// Of so many that are nearest by their first nodes, those are taken.
+const SHORTLIST: usize = 96;
 
 /// The instance with its root.
 pub(super) struct Rooted<'a> {
@@ -18,8 +26,8 @@ pub(super) struct Rooted<'a> {
     /// The start of an open path, else the smallest cluster.
     pub(super) root: usize,
     pub(super) statistics: Statistics,
-    /// Pairs that are kept where not all of them fit; the search sees the others as jumps.
-    kept: Option<Vec<bool>>,
+    /// The clusters near each one, ascending, where not all pairs are kept.
+    kept: Option<Arc<[Vec<u32>]>>,
 }
 
 /// What all costs together say.
@@ -64,9 +72,6 @@ impl<'a> Rooted<'a> {
 
     /// Whether the search sees some arc from `a` to `b`.
     pub(super) fn maybe_adjacent(&self, a: usize, b: usize) -> bool {
-        if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
-            return false;
-        }
         a >= self.instance.clusters()
             || b >= self.instance.clusters()
             || self.instance.adjacent(a, b)
@@ -94,9 +99,6 @@ impl<'a> Rooted<'a> {
 
     /// Price of a jump.
     pub(super) fn price(&self, a: usize, b: usize) -> f64 {
-        if self.kept.as_ref().is_some_and(|kept| !kept[a * self.m + b]) {
-            return f64::INFINITY; // the search caps it at its highest price
-        }
         if let Some(price) = self.statistics.big_m {
             return price;
         }
@@ -109,38 +111,57 @@ impl<'a> Rooted<'a> {
         }
     }
 
-    /// Where the blocks would need too much room, keeps those to and from the nearest clusters, by
-    /// a few of their nodes.
+    /// The clusters near each one, ascending, both ways, where the search sees no others' arcs.
+    pub(super) fn kept(&self) -> Option<&Arc<[Vec<u32>]>> {
+        self.kept.as_ref()
+    }
+
+    /// Where the blocks would need too much room, keeps those to and from the nearest clusters.
     fn keep_what_fits(&mut self) {
         // Asymmetric costs are stored by rows and by columns.
-        if 2 * self.stored_entries() <= ROOM {
+        if self.m <= MOST_CLUSTERS && 2 * self.stored_entries() <= ROOM {
             return;
         }
-        let few = |c: usize| (0..self.size(c)).step_by(self.size(c).div_ceil(4));
-        let m = self.m;
-        let mut kept = vec![false; m * m];
-        for a in 0..m {
-            let mut near: Vec<(f64, usize)> = (0..m)
-                .filter(|&b| a != b && self.maybe_adjacent(a, b))
-                .map(|b| {
-                    let arcs = few(a).flat_map(|i| few(b).map(move |j| (i, j)));
-                    let low = arcs
-                        .filter_map(|(i, j)| self.arc(a, i, b, j))
-                        .fold(f64::INFINITY, f64::min);
-                    (low, b)
-                })
-                .collect();
-            near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-            for &(_, b) in near.iter().take(KEPT) {
-                kept[a * m + b] = true;
-                kept[b * m + a] = true;
+        let near: Vec<Vec<u32>> = (0..self.m).into_par_iter().map(|a| self.nearest(a)).collect();
+        let mut kept = near.clone();
+        for (a, near) in near.iter().enumerate() {
+            for &b in near {
+                kept[b as usize].push(a as u32);
             }
         }
-        for c in 0..m {
-            kept[c * m + self.root] = true;
-            kept[self.root * m + c] = true;
+        if *self.instance.ends() != Ends::Closed {
+            for c in (0..self.m).filter(|&c| c != self.root) {
+                kept[c].push(self.root as u32);
+                kept[self.root].push(c as u32);
+            }
         }
-        self.kept = Some(kept);
+        for list in &mut kept {
+            list.sort_unstable();
+            list.dedup();
+        }
+        self.kept = Some(kept.into());
+    }
+
+    /// The clusters that are nearest to `a` by a few nodes of each.
+    fn nearest(&self, a: usize) -> Vec<u32> {
+        let few = |c: usize, most: usize| (0..self.size(c)).step_by(self.size(c).div_ceil(most));
+        let low = |b: usize, most: usize| {
+            let arcs = few(a, most).flat_map(|i| few(b, most).map(move |j| (i, j)));
+            arcs.filter_map(|(i, j)| self.arc(a, i, b, j)).fold(f64::INFINITY, f64::min)
+        };
+        let adjacent = (0..self.m).filter(|&b| a != b && self.maybe_adjacent(a, b));
+        let mut near: Vec<(f64, u32)> = adjacent.map(|b| (low(b, 1), b as u32)).collect();
+        let by_cost = |x: &(f64, u32), y: &(f64, u32)| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1));
+        for (count, most) in [(SHORTLIST, 4), (KEPT, 0)] {
+            if near.len() > count {
+                near.select_nth_unstable_by(count, by_cost);
+                near.truncate(count);
+            }
+            if most > 0 {
+                near.iter_mut().for_each(|(cost, b)| *cost = low(*b as usize, most));
+            }
+        }
+        near.into_iter().map(|(_, b)| b).collect()
     }
 
     /// Entries of the blocks that the search sees.
@@ -151,9 +172,16 @@ impl<'a> Rooted<'a> {
             .sum()
     }
 
-    /// All ordered pairs of different clusters.
+    /// The ordered pairs of different clusters that the search sees.
     pub(super) fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        (0..self.m).flat_map(move |a| (0..self.m).map(move |b| (a, b))).filter(|(a, b)| a != b)
+        (0..self.m).flat_map(move |a| {
+            let (all, near) = match &self.kept {
+                None => (0..self.m, [].as_slice()),
+                Some(kept) => (0..0, kept[a].as_slice()),
+            };
+            let all = all.filter(move |&b| a != b);
+            all.chain(near.iter().map(|&b| b as usize)).map(move |b| (a, b))
+        })
     }
 
     /// Costs from every node of `a` to every node of `b`, row by row.

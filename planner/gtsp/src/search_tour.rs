@@ -64,6 +64,44 @@ impl SearchTour {
         self.cost = self.arcs.iter().map(|&d| i64::from(d)).sum();
     }
 
+    /// Copies the positions `first..=last` of another tour to those from `to` on, also turned
+    /// around; the arc behind the last one is for the caller to refresh.
+    pub(super) fn take_stretch(
+        &mut self,
+        other: &Self,
+        (first, last): (usize, usize),
+        forward: bool,
+        to: usize,
+    ) {
+        if forward && first == to {
+            return; // It lies there already.
+        }
+        let end = to + last - first;
+        self.order[to..=end].copy_from_slice(&other.order[first..=last]);
+        self.arcs[to..end].copy_from_slice(&other.arcs[first..last]);
+        self.slack[to..end].copy_from_slice(&other.slack[first..last]);
+        if forward {
+            self.renumber(to, end);
+        } else {
+            self.reverse(to, end);
+        }
+    }
+
+    /// Brings the arcs at some clusters and the cost up to date.
+    pub(super) fn refresh_around<'a>(
+        &mut self,
+        table: &Table,
+        clusters: impl Iterator<Item = &'a u32>,
+    ) {
+        let m = self.order.len();
+        for &c in clusters {
+            let p = self.position[c as usize] as usize;
+            self.refresh(table, p + m - 1);
+            self.refresh(table, p);
+        }
+        self.cost = self.arcs.iter().map(|&d| i64::from(d)).sum();
+    }
+
     /// Brings the cached arc from position `p` on up to date; m is the root again.
     #[inline]
     pub(super) fn refresh(&mut self, table: &Table, p: usize) {

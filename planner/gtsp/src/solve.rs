@@ -170,7 +170,8 @@ pub fn solve_with(
         .num_threads(budget.threads)
         .build()
         .map_err(|e| SolveError::Threads { threads: budget.threads, reason: e.to_string() })?;
-    let full = Table::new(instance)
+    let full = pool
+        .install(|| Table::new(instance))
         .ok_or(SolveError::TooLarge { clusters: instance.clusters(), nodes: instance.nodes() })?;
     Ok(pool.install(|| run_epochs(instance, &full, budget, seed, control, started)))
 }

@@ -5,22 +5,19 @@
 //! no higher, so that a huge h neither overflows nor freezes the search; what a tour really costs
 //! is always taken from the instance.
 
-use crate::instance::{Ends, Instance, Jump};
+use crate::instance::{Ends, Instance};
+use crate::pairs::{Pair, Pairs};
+use crate::quantiser::Quantiser;
 use crate::rooted::Rooted;
 
-/// Jump price in the search, in units of the largest arc worth having.
-const JUMP_FACTOR: f64 = 4.0;
 /// Length of a candidate list.
 const NEAR: usize = 10;
 /// Instances of fewer clusters, the root's included, are enumerated.
 const SMALL: usize = 9;
-/// Costs of at most this much count as zero.
-const TINY: f64 = 1e-200;
 /// Costs that are handled side by side; blocks may be read this far past their end.
 pub(super) const LANES: usize = 8;
 
 /// Costs for the search over `m` clusters, one of which, the root, always stands at position 0.
-#[derive(Default)]
 pub(super) struct Table {
     pub(super) m: usize,
     pub(super) root: usize,
@@ -29,18 +26,11 @@ pub(super) struct Table {
     pub(super) reversible: bool,
     /// Mean over the clusters of the cheapest arc out of them: the scale of the temperature.
     pub(super) typical: f64,
-    pairs: Vec<Pair>,
-    transposed: Vec<u32>,
+    pairs: Pairs,
     data: Vec<i32>,
-    lowest: Vec<i32>,
-    /// The cheapest entry of each row of each block, and where a pair's begin.
+    /// The cheapest entry of each row of each block.
     row_lowest: Vec<i32>,
-    row_starts: Vec<u32>,
-    near_out: Vec<u32>,
-    near_in: Vec<u32>,
-    near_cost: Vec<i32>,
-    near_in_cost: Vec<i32>,
-    near_start: Vec<(u32, u32)>,
+    near: Near,
     /// The root is the fixed start outside the clusters.
     pub(super) outer_root: bool,
     /// No arc leads to the root but the closing one, which is free.
@@ -49,11 +39,14 @@ pub(super) struct Table {
     names: Option<Vec<Vec<u32>>>,
 }
 
-/// Where a block lies; absent blocks share one of zeros and add their price.
-#[derive(Clone, Copy)]
-struct Pair {
-    at: u32,
-    add: i32,
+/// The clusters that are cheap to reach from each one, and those from which it is, nearest first,
+/// with the cheapest arc.
+#[derive(Default)]
+struct Near {
+    out: Vec<(u32, i32)>,
+    into: Vec<(u32, i32)>,
+    /// Where each cluster's begin.
+    starts: Vec<(u32, u32)>,
 }
 
 impl Table {
@@ -64,8 +57,8 @@ impl Table {
         let sizes: Vec<u32> = (0..m).map(|a| rooted.size(a) as u32).collect();
         let mut blocks = Blocks::of(&rooted);
         let reversible = blocks.reversible(&rooted);
-        let transposed = blocks.transpose(&rooted, reversible);
-        let Blocks { pairs, mut data, lowest } = blocks;
+        blocks.transpose(&rooted, reversible);
+        let Blocks { pairs, mut data } = blocks;
         data.extend_from_slice(&[0; LANES]);
         let mut table = Self {
             m,
@@ -74,14 +67,13 @@ impl Table {
             reversible,
             typical: 1.0,
             pairs,
-            transposed,
             data,
-            lowest,
             outer_root: root >= instance.clusters(),
             open: *instance.ends() != Ends::Closed,
             names: None,
             // Filled in below.
-            ..Self::default()
+            row_lowest: Vec::new(),
+            near: Near::default(),
         };
         table.find_row_lowest();
         table.find_candidates();
@@ -95,38 +87,29 @@ impl Table {
         let widest = sizes.iter().copied().max().unwrap_or(1) as usize;
         let mut data = vec![0; widest * widest];
         let mut pairs = self.pairs.clone();
-        let mut transposed = self.transposed.clone();
-        let mut lowest = self.lowest.clone();
-        for a in 0..m {
-            for b in 0..m {
-                let k = a * m + b;
-                if self.pairs[k].at == 0 {
-                    continue;
-                }
-                pairs[k].at = data.len() as u32;
-                for &i in &nodes[a] {
-                    let (_, row) = self.row(a as u32, i, b as u32);
-                    data.extend(nodes[b].iter().map(|&j| row[j as usize]));
-                }
-                lowest[k] = data[pairs[k].at as usize..].iter().copied().min().unwrap_or(0);
+        let stored = || (0..m as u32).flat_map(|a| self.pairs.row(a as usize).map(move |b| (a, b)));
+        let stored = || stored().filter(|&(a, b)| self.is_stored(a, b));
+        for (a, b) in stored() {
+            let at = data.len();
+            for &i in &nodes[a as usize] {
+                let (_, row) = self.row(a, i, b);
+                data.extend(nodes[b as usize].iter().map(|&j| row[j as usize]));
             }
+            let lowest = data[at..].iter().copied().min().unwrap_or(0);
+            pairs.set(a, b, Pair { at: at as u32, lowest, ..self.pairs.get(a, b) });
         }
-        for a in 0..m {
-            for b in 0..m {
-                let k = a * m + b;
-                if self.pairs[k].at == 0 {
-                    continue;
+        for (a, b) in stored() {
+            let transposed = if self.pairs.get(a, b).transposed == self.pairs.get(b, a).at {
+                pairs.get(b, a).at
+            } else {
+                let at = data.len();
+                for &j in &nodes[b as usize] {
+                    let (_, column) = self.column(a, b, j);
+                    data.extend(nodes[a as usize].iter().map(|&i| column[i as usize]));
                 }
-                if self.transposed[k] == self.pairs[b * m + a].at {
-                    transposed[k] = pairs[b * m + a].at;
-                } else {
-                    transposed[k] = data.len() as u32;
-                    for &j in &nodes[b] {
-                        let (_, column) = self.column(a as u32, b as u32, j);
-                        data.extend(nodes[a].iter().map(|&i| column[i as usize]));
-                    }
-                }
-            }
+                at as u32
+            };
+            pairs.set(a, b, Pair { transposed, ..pairs.get(a, b) });
         }
         data.extend_from_slice(&[0; LANES]);
         let mut table = Self {
@@ -136,14 +119,13 @@ impl Table {
             reversible: self.reversible,
             typical: self.typical,
             pairs,
-            transposed,
             data,
-            lowest,
             outer_root: self.outer_root,
             open: self.open,
             names: Some(nodes.to_vec()),
             // Filled in below.
-            ..Self::default()
+            row_lowest: Vec::new(),
+            near: Near::default(),
         };
         table.find_row_lowest();
         table.find_candidates();
@@ -158,75 +140,71 @@ impl Table {
 
     /// Whether arcs from `a` to `b` are known one by one.
     pub(super) fn is_stored(&self, a: u32, b: u32) -> bool {
-        self.pairs[a as usize * self.m + b as usize].at != 0
+        self.pairs.get(a, b).at != 0
     }
 
     fn find_row_lowest(&mut self) {
-        let m = self.m;
         let widest = self.sizes.iter().copied().max().unwrap_or(1) as usize;
         // Pairs that are not stored share a block of zeros.
-        self.row_lowest = vec![0; widest];
-        self.row_starts = vec![0; m * m];
-        for a in 0..m {
-            for b in 0..m {
-                let at = self.pairs[a * m + b].at as usize;
-                if at != 0 {
-                    let (x, y) = (self.sizes[a] as usize, self.sizes[b] as usize);
-                    self.row_starts[a * m + b] = self.row_lowest.len() as u32;
-                    let rows = self.data[at..at + x * y].chunks_exact(y);
-                    self.row_lowest.extend(rows.map(|row| row.iter().copied().min().unwrap_or(0)));
+        let mut row_lowest = vec![0; widest];
+        for a in 0..self.m as u32 {
+            let row: Vec<u32> = self.pairs.row(a as usize).collect();
+            for b in row {
+                let pair = self.pairs.get(a, b);
+                if pair.at != 0 {
+                    let rows = row_lowest.len() as u32;
+                    self.pairs.set(a, b, Pair { rows, ..pair });
+                    let (_, block) = self.block(a, b);
+                    let lows = block
+                        .chunks_exact(self.sizes[b as usize] as usize)
+                        .map(|row| row.iter().copied().min().unwrap_or(0));
+                    row_lowest.extend(lows);
                 }
             }
         }
+        self.row_lowest = row_lowest;
     }
 
     fn find_candidates(&mut self) {
-        let (m, open) = (self.m, self.open);
+        let (open, root) = (self.open, self.root as u32);
         let mut typical = 0.0;
         let mut counted = 0;
-        for a in 0..m {
-            let list =
-                |cost: &dyn Fn(usize) -> i32, present: &dyn Fn(usize) -> bool, skip_root: bool| {
-                    let mut list: Vec<(i32, usize)> = (0..m)
-                        .filter(|&b| b != a && !(skip_root && b == self.root))
-                        .filter(|&b| present(b))
-                        .map(|b| (cost(b), b))
-                        .collect();
-                    list.sort_unstable();
-                    list.truncate(NEAR);
-                    list
-                };
-            let out = list(&|b| self.lowest[a * m + b], &|b| self.pairs[a * m + b].at != 0, open);
-            let into = list(&|b| self.lowest[b * m + a], &|b| self.pairs[b * m + a].at != 0, false);
+        let mut near = Near::default();
+        for a in 0..self.m as u32 {
+            let nearest = |skip_root: bool, pair: &dyn Fn(u32) -> Pair| {
+                let others = self.pairs.row(a as usize).filter(|&b| !(skip_root && b == root));
+                let arcs = others.map(|b| (pair(b), b)).filter(|(pair, _)| pair.at != 0);
+                let mut list: Vec<(i32, u32)> = arcs.map(|(pair, b)| (pair.lowest, b)).collect();
+                list.sort_unstable();
+                list.truncate(NEAR);
+                list
+            };
+            let out = nearest(open, &|b| self.pairs.get(a, b));
+            let into = nearest(false, &|b| self.pairs.get(b, a));
             if let Some(&(c, _)) = out.first() {
                 typical += f64::from(c);
                 counted += 1;
             }
-            self.near_start.push((self.near_out.len() as u32, self.near_in.len() as u32));
-            for (c, b) in out {
-                self.near_out.push(b as u32);
-                self.near_cost.push(c);
-            }
-            for (c, b) in into {
-                self.near_in.push(b as u32);
-                self.near_in_cost.push(c);
-            }
+            near.starts.push((near.out.len() as u32, near.into.len() as u32));
+            near.out.extend(out.into_iter().map(|(c, b)| (b, c)));
+            near.into.extend(into.into_iter().map(|(c, b)| (b, c)));
         }
-        self.near_start.push((self.near_out.len() as u32, self.near_in.len() as u32));
+        near.starts.push((near.out.len() as u32, near.into.len() as u32));
+        self.near = near;
         self.typical = (typical / f64::from(counted.max(1))).max(1.0);
     }
 
     /// Cost from node `i` of `a` to node `j` of `b`.
     #[inline]
     pub(super) fn d(&self, a: u32, i: u32, b: u32, j: u32) -> i32 {
-        let pair = self.pairs[a as usize * self.m + b as usize];
+        let pair = self.pairs.get(a, b);
         pair.add + self.data[(pair.at + i * self.sizes[b as usize] + j) as usize]
     }
 
     /// Costs from node `i` of `a` to every node of `b`: what to add, and the row.
     #[inline]
     pub(super) fn row(&self, a: u32, i: u32, b: u32) -> (i32, &[i32]) {
-        let pair = self.pairs[a as usize * self.m + b as usize];
+        let pair = self.pairs.get(a, b);
         let width = self.sizes[b as usize];
         let at = (pair.at + i * width) as usize;
         (pair.add, &self.data[at..at + width as usize])
@@ -235,16 +213,16 @@ impl Table {
     /// Costs from every node of `a` to node `j` of `b`.
     #[inline]
     pub(super) fn column(&self, a: u32, b: u32, j: u32) -> (i32, &[i32]) {
-        let k = a as usize * self.m + b as usize;
+        let pair = self.pairs.get(a, b);
         let height = self.sizes[a as usize];
-        let at = (self.transposed[k] + j * height) as usize;
-        (self.pairs[k].add, &self.data[at..at + height as usize])
+        let at = (pair.transposed + j * height) as usize;
+        (pair.add, &self.data[at..at + height as usize])
     }
 
     /// The block from `a` to `b`, row-major.
     #[inline]
     pub(super) fn block(&self, a: u32, b: u32) -> (i32, &[i32]) {
-        let pair = self.pairs[a as usize * self.m + b as usize];
+        let pair = self.pairs.get(a, b);
         let count = (self.sizes[a as usize] * self.sizes[b as usize]) as usize;
         (pair.add, &self.data[pair.at as usize..pair.at as usize + count])
     }
@@ -252,20 +230,20 @@ impl Table {
     /// Cheapest arc from `a` to `b`.
     #[inline]
     pub(super) fn low(&self, a: u32, b: u32) -> i32 {
-        self.lowest[a as usize * self.m + b as usize]
+        self.pairs.get(a, b).lowest
     }
 
     /// The block from `a` to `b` with the data that follow it, at least `LANES` entries.
     #[inline]
     pub(super) fn open_block(&self, a: u32, b: u32) -> (i32, &[i32]) {
-        let pair = self.pairs[a as usize * self.m + b as usize];
+        let pair = self.pairs.get(a, b);
         (pair.add, &self.data[pair.at as usize..])
     }
 
     /// For each node of `a` the cheapest entry of its row in [`Self::open_block`].
     #[inline]
     pub(super) fn row_lowest(&self, a: u32, b: u32) -> &[i32] {
-        let at = self.row_starts[a as usize * self.m + b as usize] as usize;
+        let at = self.pairs.get(a, b).rows as usize;
         &self.row_lowest[at..at + self.sizes[a as usize] as usize]
     }
 
@@ -284,17 +262,15 @@ impl Table {
     /// Clusters that are cheap to reach from `a`, nearest first, with the cheapest arc.
     #[inline]
     pub(super) fn near_out(&self, a: u32) -> impl Iterator<Item = (u32, i32)> + '_ {
-        let range =
-            self.near_start[a as usize].0 as usize..self.near_start[a as usize + 1].0 as usize;
-        self.near_out[range.clone()].iter().copied().zip(self.near_cost[range].iter().copied())
+        let starts = &self.near.starts[a as usize..];
+        self.near.out[starts[0].0 as usize..starts[1].0 as usize].iter().copied()
     }
 
     /// Clusters from which `a` is cheap to reach, nearest first, with the cheapest arc.
     #[inline]
     pub(super) fn near_in(&self, a: u32) -> impl Iterator<Item = (u32, i32)> + '_ {
-        let range =
-            self.near_start[a as usize].1 as usize..self.near_start[a as usize + 1].1 as usize;
-        self.near_in[range.clone()].iter().copied().zip(self.near_in_cost[range].iter().copied())
+        let starts = &self.near.starts[a as usize..];
+        self.near.into[starts[0].1 as usize..starts[1].1 as usize].iter().copied()
     }
 
     /// The instance's node that node `i` of cluster `c` stands for.
@@ -304,49 +280,47 @@ impl Table {
     }
 }
 
-/// The blocks of all cluster pairs, row by row, before they are transposed.
+/// The blocks of all cluster pairs.
 struct Blocks {
-    pairs: Vec<Pair>,
+    pairs: Pairs,
     data: Vec<i32>,
-    lowest: Vec<i32>,
 }
 
 impl Blocks {
+    /// Row by row.
     fn of(rooted: &Rooted<'_>) -> Self {
-        let (m, widest) = (rooted.m, rooted.widest());
-        let quantise = quantiser(rooted);
+        let widest = rooted.widest();
+        let quantiser = Quantiser::new(rooted);
         let mut data = vec![0; widest * widest];
-        let mut pairs = vec![Pair { at: 0, add: 0 }; m * m];
-        let mut lowest = vec![i32::MAX; m * m];
+        let mut pairs = Pairs::new(rooted, &quantiser);
         let mut row = Vec::new();
         for (a, b) in rooted.pairs() {
-            let search_price = quantise(rooted.price(a, b));
+            let mut pair = Pair::flat(quantiser.steps(rooted.price(a, b)));
             row.clear();
             let mut present = false;
             if rooted.maybe_adjacent(a, b) {
                 for entry in rooted.entries(a, b) {
                     present |= entry.is_some();
-                    row.push(entry.map_or(search_price, &quantise));
+                    row.push(entry.map_or(pair.add, |cost| quantiser.steps(cost)));
                 }
             }
             if present {
-                pairs[a * m + b] = Pair { at: data.len() as u32, add: 0 };
-                lowest[a * m + b] = row.iter().copied().min().unwrap_or(i32::MAX);
+                let lowest = row.iter().copied().min().unwrap_or(i32::MAX);
+                pair = Pair { at: data.len() as u32, lowest, ..Pair::flat(0) };
                 data.extend_from_slice(&row);
-            } else {
-                pairs[a * m + b] = Pair { at: 0, add: search_price };
-                lowest[a * m + b] = search_price;
             }
+            pairs.set(a as u32, b as u32, pair);
         }
-        Self { pairs, data, lowest }
+        Self { pairs, data }
     }
 
     /// Whether the costs between all clusters but the root are symmetric.
     fn reversible(&self, rooted: &Rooted<'_>) -> bool {
-        let (m, root) = (rooted.m, rooted.root);
+        let root = rooted.root;
         rooted.pairs().all(|(a, b)| {
             a < b || a == root || b == root || {
-                let (p, q) = (self.pairs[a * m + b], self.pairs[b * m + a]);
+                let (p, q) =
+                    (self.pairs.get(a as u32, b as u32), self.pairs.get(b as u32, a as u32));
                 let (x, y) = (rooted.size(a), rooted.size(b));
                 p.add == q.add
                     && (0..x).all(|i| {
@@ -359,53 +333,27 @@ impl Blocks {
         })
     }
 
-    /// Where each block lies column by column: the opposite block where that is the same.
-    fn transpose(&mut self, rooted: &Rooted<'_>, reversible: bool) -> Vec<u32> {
-        let (m, root) = (rooted.m, rooted.root);
-        let mut transposed = vec![0; m * m];
+    /// Finds each block column by column: the opposite block where that is the same.
+    fn transpose(&mut self, rooted: &Rooted<'_>, reversible: bool) {
         for (a, b) in rooted.pairs() {
-            let p = self.pairs[a * m + b];
-            if p.at == 0 {
+            let pair = self.pairs.get(a as u32, b as u32);
+            if pair.at == 0 {
                 continue;
             }
-            let back = self.pairs[b * m + a];
-            transposed[a * m + b] = if reversible && a != root && b != root {
-                back.at
+            let transposed = if reversible && a != rooted.root && b != rooted.root {
+                self.pairs.get(b as u32, a as u32).at
             } else {
                 let (x, y) = (rooted.size(a), rooted.size(b));
                 let start = self.data.len();
                 for j in 0..y {
                     for i in 0..x {
-                        let value = self.data[p.at as usize + i * y + j];
+                        let value = self.data[pair.at as usize + i * y + j];
                         self.data.push(value);
                     }
                 }
                 start as u32
             };
+            self.pairs.set(a as u32, b as u32, Pair { transposed, ..pair });
         }
-        transposed
     }
-}
-
-/// Costs to integers, so that the sum of a whole tour fits 32 bits; the identity where the costs are
-/// small integers.
-fn quantiser(rooted: &Rooted<'_>) -> impl Fn(f64) -> i32 {
-    let (statistics, jump) = (&rooted.statistics, rooted.instance.jump());
-    // Without any arc, or with free ones only, jumps alone set the scale.
-    let cap = if statistics.largest > TINY { statistics.largest } else { 1.0 };
-    // Prices of a table differ among themselves, which must not be lost.
-    let highest_price = match jump {
-        Jump::Table(table) => table.iter().copied().fold(0.0, f64::max),
-        _ => 0.0,
-    };
-    let ceiling = highest_price.max(JUMP_FACTOR * cap);
-    let room = f64::from(1 << 30) / (rooted.m + 2) as f64;
-    let whole_prices = match (statistics.big_m, jump) {
-        (Some(_), _) | (None, Jump::Forbidden) => true,
-        (None, Jump::Uniform(h)) => h.fract() == 0.0,
-        (None, Jump::Table(table)) => table.iter().all(|h| h.fract() == 0.0),
-    };
-    let exact = statistics.integers && whole_prices && ceiling <= room;
-    let scale = if exact { 1.0 } else { room / ceiling };
-    move |c| (c.clamp(-ceiling, ceiling) * scale).round() as i32
 }
