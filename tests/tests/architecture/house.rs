@@ -54,6 +54,7 @@ pub(crate) const CRATES: &[Crate] = &[
         ],
     ),
     with("executor", &["ipc-types", "robot"]),
+    with("bridge", &["ipc-types", "robot", "executor"]),
     Crate { dir: "tests", may: May::ImportAll, dev: &[] },
     with(
         "tests/inputs",
@@ -68,7 +69,7 @@ pub(crate) const CRATES: &[Crate] = &[
         ],
     ),
     with("fuzz", &["tests/inputs"]),
-    with("pr2-bridge", &["ipc-types", "robot", "executor"]),
+    with("pr2-bridge", &["ipc-types", "robot", "executor", "bridge"]),
 ];
 
 /// Crates that share the wire and nothing else: no way may lead from one to the other.
