@@ -48,6 +48,8 @@ def main():
                         f"error {error:.4f} rad  missed {t.missed_cycles}")
                 if t.lost_lines:
                     line += f"  log lines lost {t.lost_lines}"
+                if t.unverified:
+                    line += "  the plan is NOT VERIFIED"
                 if fault != types.Fault.NONE:
                     line += f"  {fault.text}"
                 print("\r" + line + "\033[K", end="", flush=True)

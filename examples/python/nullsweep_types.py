@@ -121,12 +121,12 @@ class PlanHeader(ctypes.Structure):
         ("join_rule", ctypes.c_uint32),
         ("join_knot", ctypes.c_uint32),
         ("corners", ctypes.c_uint32),
-        ("reserved", ctypes.c_uint32),
+        ("verified", ctypes.c_uint32),
     ]
 
     @staticmethod
     def type_name():
-        return "nullsweep.PlanHeader.v2"
+        return "nullsweep.PlanHeader.v3"
 
 
 assert ctypes.sizeof(PlanHeader) == 400
@@ -259,14 +259,16 @@ class Telemetry(ctypes.Structure):
         ("mode", ctypes.c_uint32),
         ("fault", ctypes.c_uint32),
         ("knot", ctypes.c_uint32),
+        ("unverified", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
     ]
 
     @staticmethod
     def type_name():
-        return "nullsweep.Telemetry.v3"
+        return "nullsweep.Telemetry.v4"
 
 
-assert ctypes.sizeof(Telemetry) == 728
+assert ctypes.sizeof(Telemetry) == 736
 
 
 class EventKind(enum.IntEnum):
@@ -438,11 +440,13 @@ class Response(ctypes.Structure):
         ("mode", ctypes.c_uint32),
         ("fault", ctypes.c_uint32),
         ("knot", ctypes.c_uint32),
+        ("unverified", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
     ]
 
     @staticmethod
     def type_name():
-        return "nullsweep.Response.v1"
+        return "nullsweep.Response.v2"
 
 
-assert ctypes.sizeof(Response) == 48
+assert ctypes.sizeof(Response) == 56

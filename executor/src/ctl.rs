@@ -137,7 +137,29 @@ impl std::fmt::Display for Answer<'_> {
         }
         if response.plan.is_some() {
             write!(f, ", plan {} at knot {}", response.plan, response.knot)?;
+            if response.unverified != 0 {
+                f.write_str(" (NOT VERIFIED)")?;
+            }
         }
         write!(f, ", speed {:.0} %", response.speed_scale * 100.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+    use nullsweep_ipc_types::PlanId;
+
+    use super::*;
+
+    #[test]
+    fn a_plan_that_is_not_verified_is_told() {
+        let plan = PlanId { epoch: 0xabc, number: 2 };
+        let mode = Mode::Executing.wire();
+        let verified = Response { plan, mode, speed_scale: 1.0, knot: 3, ..Response::zeroed() };
+        let text = Answer(&verified).to_string();
+        assert_eq!(text, "accepted: executing, plan abc/2 at knot 3, speed 100 %");
+        let text = Answer(&Response { unverified: 1, ..verified }).to_string();
+        assert!(text.contains("plan abc/2 at knot 3 (NOT VERIFIED), speed"), "{text}");
     }
 }

@@ -167,6 +167,8 @@ fn response(verdict: Verdict, snapshot: Option<Snapshot>) -> Response {
         mode: snapshot.map_or(Mode::Init, |s| s.mode).wire(),
         fault: snapshot.map_or(Fault::None, |s| s.fault).wire(),
         knot: snapshot.map_or(0, |s| s.knot),
+        unverified: u32::from(snapshot.is_some_and(|s| s.unverified)),
+        reserved: 0,
     }
 }
 

@@ -6,6 +6,9 @@ use nullsweep_robot::{Continuous, JointLimits, JointVector, MAX_DOF};
 /// A joint that moves less than this to a plan's first knot stands: at no acceleration does it come
 /// to a speed that matters. \[rad\]
 const STILL: f64 = 1e-11;
+/// What a planner's acceleration may exceed its limit by: as a share of it, and at all. \[rad/s²\]
+const ROUNDING_SHARE: f64 = 1e-6;
+const ROUNDING: f64 = 1e-9;
 
 /// What one joint may do, as the robot crate reads it from the URDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,18 +140,43 @@ impl Guard {
         Continuous::new(self.joints.map(|joint| joint.limits.continuous))
     }
 
-    /// The acceleration of a joint from where the arm holds to a plan's first knot.
-    /// \[rad/s²\] or \[m/s²\]
+    /// The acceleration of a joint from where the arm holds to a plan's first knot. Halfway it
+    /// turns from speeding up to slowing down at once: twice the acceleration is within a cycle's
+    /// [`Self::sudden`]. \[rad/s²\] or \[m/s²\]
     #[must_use]
     pub fn connector_acceleration(&self, joint: usize) -> f64 {
-        self.connector_acceleration.min(self.joints[joint].limits.acceleration)
+        let own = self.joints[joint].limits.acceleration;
+        self.connector_acceleration.min(own).min(0.5 * self.sudden(joint))
     }
 
     /// How far two velocities of a joint may differ and still count as one: what its acceleration
-    /// limit and the stop acceleration change in one cycle. \[rad/s\]
+    /// limit, the stop acceleration and its jerk limit change in one cycle. \[rad/s\]
     #[must_use]
     pub fn velocity_tolerance(&self, joint: usize) -> f64 {
-        self.stop_acceleration.min(self.joints[joint].limits.acceleration) * self.period()
+        let own = self.joints[joint].limits.acceleration;
+        self.stop_acceleration.min(own).min(self.sudden(joint)) * self.period()
+    }
+
+    /// By how much a joint's acceleration may change at once: what its jerk limit changes in a
+    /// cycle, because setpoints a cycle apart show no more of it. Infinite without such a limit.
+    /// \[rad/s²\] or \[m/s²\]
+    #[must_use]
+    pub fn sudden(&self, joint: usize) -> f64 {
+        self.joints[joint].limits.jerk.map_or(f64::INFINITY, |jerk| jerk * self.period())
+    }
+
+    /// Whether a joint's acceleration may change like this within a cycle; else the jerk that the
+    /// setpoints would show, and its limit. \[rad/s³\]
+    ///
+    /// # Errors
+    /// Both, where it may not.
+    pub fn allows_step(&self, joint: usize, from: f64, to: f64) -> Result<(), (f64, f64)> {
+        let (step, most) = ((to - from).abs(), self.sudden(joint));
+        // Written so that NaN is none that is allowed.
+        if step <= most * (1.0 + ROUNDING_SHARE) + ROUNDING || most == f64::INFINITY {
+            return Ok(());
+        }
+        Err((step / self.period(), most / self.period()))
     }
 
     /// The acceleration with which a joint of the motion from where the arm holds to a plan's first

@@ -81,18 +81,38 @@ pub fn top_speed(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> f
     }
 }
 
+/// The accelerations of joint `j` at both ends of a curve, between which it is linear in time. A
+/// straight segment has none but in its corners. \[rad/s²\]
+#[must_use]
+pub(crate) fn ends(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> [f64; 2] {
+    match kind {
+        Interpolation::Linear => [0.0; 2],
+        Interpolation::Cubic => {
+            let c = Cubic::new(a, b, j);
+            [2.0 * c.c2, 2.0 * c.c2 + 6.0 * c.c3].map(|end| end / seconds(a, b).powi(2))
+        }
+    }
+}
+
+/// The acceleration of joint `j` in the segment `a`…`b` at plan time `time`. \[rad/s²\]
+#[must_use]
+pub(crate) fn acceleration(
+    a: &PlanKnot,
+    b: &PlanKnot,
+    kind: Interpolation,
+    j: usize,
+    time: f64,
+) -> f64 {
+    let [from, to] = ends(a, b, kind, j);
+    from + (to - from) * ((time - a.time) / (b.time - a.time))
+}
+
 /// The greatest acceleration of joint `j` within a curve, NaN where that is no number; it is linear
 /// in time. A straight segment has none but in its corners. \[rad/s²\]
 #[must_use]
 pub fn top_acceleration(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> f64 {
-    match kind {
-        Interpolation::Linear => 0.0,
-        Interpolation::Cubic => {
-            let c = Cubic::new(a, b, j);
-            let ends = [2.0 * c.c2, 2.0 * c.c2 + 6.0 * c.c3];
-            greater(ends[0].abs(), ends[1].abs()) / seconds(a, b).powi(2)
-        }
-    }
+    let [from, to] = ends(a, b, kind, j);
+    greater(from.abs(), to.abs())
 }
 
 /// The jerk of joint `j` within a curve, NaN where that is no number; it is constant there, and the

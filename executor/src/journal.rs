@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use nullsweep_ipc_types::{Command, CommandKind, EventKind, Fault, Mode, Reason, Response};
+use nullsweep_ipc_types::{Command, CommandKind, EventKind, Fault, Mode, PlanId, Reason, Response};
 
 use crate::cycle::{Event, Snapshot};
 use crate::words::{self, Words};
@@ -18,6 +18,8 @@ pub(crate) struct Journal {
     words: Words,
     mode: Mode,
     fault: Fault,
+    /// The plan that was last warned of.
+    unverified: PlanId,
     /// Since when the loop waits in [`Mode::Init`], and for what was told to be waited.
     init: Instant,
     waits_for: Option<Fault>,
@@ -31,6 +33,7 @@ impl Journal {
             words,
             mode: Mode::Init,
             fault: Fault::None,
+            unverified: PlanId::NONE,
             init: Instant::now(),
             waits_for: None,
             missed: (0, None),
@@ -79,6 +82,14 @@ impl Journal {
         let lapse = matches!(now.fault, Fault::StaleState | Fault::HeldJoint);
         if lapse && fault != now.fault && matches!(now.mode, Mode::Stopping | Mode::Hold) {
             tracing::warn!("stopped on the path: {}", self.words.fault(now));
+        }
+        if now.unverified && self.unverified != now.plan {
+            self.unverified = now.plan;
+            tracing::warn!(
+                "plan {} is executed and NOT VERIFIED: its sender does not say that the planner's \
+                 check passed it",
+                now.plan
+            );
         }
         self.warn_of_missed(now.missed);
     }

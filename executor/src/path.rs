@@ -130,17 +130,6 @@ impl Path {
         Some(knot)
     }
 
-    /// The velocity with which a knot is reached at full rate: none in the first one, which the
-    /// connector leads to. \[rad/s\]
-    #[must_use]
-    pub fn speed_into(&self, knot: usize) -> JointVector {
-        let knots = self.plan.knots();
-        match (knot.checked_sub(1).and_then(|before| knots.get(before)), knots.get(knot)) {
-            (Some(a), Some(b)) => sample(a, b, self.plan.interpolation(), b.time).v,
-            _ => JointVector::ZERO,
-        }
-    }
-
     /// The last knot's place in this path.
     #[must_use]
     pub fn end(&self) -> JointVector {
@@ -311,8 +300,10 @@ mod tests {
             far in any::<bool>(),
             weak in 0..DOF,
             share in 0.1..1.0f64,
+            jerky in any::<bool>(),
         ) {
             let mut guard = pr2();
+            guard.joints[weak].limits.jerk = jerky.then_some(2000.0 * share);
             guard.joints[weak].limits.acceleration *= share;
             let from = JointVector::new([0.1; MAX_DOF]);
             let reach = if far { 1.0 } else { guard.start_tolerance };
@@ -344,6 +335,17 @@ mod tests {
                 last = next;
             }
             prop_assert_eq!(last.q, to);
+            // At rest before and after: the setpoints show no more jerk than there may be.
+            let speed = |k: isize| match k {
+                0.. => connector.sample(k as f64 * cycle, 1.0).v[weak],
+                _ => 0.0,
+            };
+            for k in -2..=cycles as isize {
+                let change = speed(k) - 2.0 * speed(k + 1) + speed(k + 2);
+                let shown = change.abs() / guard.period().powi(2);
+                let most = guard.joints[weak].limits.jerk.unwrap_or(f64::INFINITY);
+                prop_assert!(shown <= most * (1.0 + 1e-6), "{shown} of {most} rad/s³");
+            }
         }
     }
 }

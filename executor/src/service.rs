@@ -132,6 +132,8 @@ impl Service {
             mode: snapshot.mode.wire(),
             fault: snapshot.fault.wire(),
             knot: snapshot.knot,
+            unverified: u32::from(snapshot.unverified),
+            reserved: 0,
         }
     }
 }

@@ -286,6 +286,7 @@ mod tests {
             mode,
             fault,
             plan: PlanId::NONE,
+            unverified: false,
             knot: 0,
             plan_time_ns: 0,
             rate: 0.0,

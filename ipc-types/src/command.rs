@@ -61,7 +61,7 @@ assert_layout!(Command, 16);
 /// The answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
-#[type_name("nullsweep.Response.v1")]
+#[type_name("nullsweep.Response.v2")]
 pub struct Response {
     /// When it was answered. \[ns\]
     pub stamp_ns: u64,
@@ -77,5 +77,10 @@ pub struct Response {
     pub fault: u32,
     /// The knot whose segment is being executed.
     pub knot: u32,
+    /// Non-zero: the plan in execution is one that its sender does not call verified, see
+    /// [`crate::PlanHeader::verified`].
+    pub unverified: u32,
+    /// Zero.
+    pub reserved: u32,
 }
-assert_layout!(Response, 48);
+assert_layout!(Response, 56);

@@ -104,7 +104,7 @@ impl Knot {
 /// What the executor must know of a plan before it admits it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
-#[type_name("nullsweep.PlanHeader.v2")]
+#[type_name("nullsweep.PlanHeader.v3")]
 pub struct PlanHeader {
     /// This plan.
     pub id: PlanId,
@@ -137,8 +137,9 @@ pub struct PlanHeader {
     /// first and the last one too: bang-bang. Zero: it steps by no more than the joints may change
     /// it in a cycle.
     pub corners: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Non-zero: the planner's last check passed this very plan. Zero: its sender does not say so,
+    /// and while it runs the executor tells everybody that it is not verified.
+    pub verified: u32,
 }
 assert_layout!(PlanHeader, 400);
 

@@ -76,7 +76,7 @@ pub const fn bucket_upper_ns(bucket: usize) -> u64 {
 /// A snapshot of the executor, about 100 Hz.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
-#[type_name("nullsweep.Telemetry.v3")]
+#[type_name("nullsweep.Telemetry.v4")]
 pub struct Telemetry {
     /// Rises by one each sample.
     pub sequence: u64,
@@ -113,5 +113,10 @@ pub struct Telemetry {
     pub fault: u32,
     /// The knot whose segment is being executed.
     pub knot: u32,
+    /// Non-zero: the plan in execution is one that its sender does not call verified, see
+    /// [`crate::PlanHeader::verified`].
+    pub unverified: u32,
+    /// Zero.
+    pub reserved: u32,
 }
-assert_layout!(Telemetry, 728);
+assert_layout!(Telemetry, 736);

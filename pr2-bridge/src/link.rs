@@ -4,9 +4,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc as std_mpsc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
+use nullsweep_bridge::wall_time;
 use nullsweep_ipc_types::ports::now_ns;
 use roslibrust::ros1::NodeHandle;
 use tokio::sync::mpsc;
@@ -134,36 +135,8 @@ pub fn call(common: &Common, service: Service) -> anyhow::Result<()> {
 
 /// ROS time of a moment on `CLOCK_MONOTONIC`.
 pub fn ros_time(at_ns: u64) -> roslibrust::codegen::integral_types::Time {
-    let total = i128::from(at_ns) + wall_ahead_ns();
-    roslibrust::codegen::integral_types::Time {
-        secs: (total / 1_000_000_000) as i32,
-        nsecs: (total % 1_000_000_000) as i32,
-    }
-}
-
-/// The moment on `CLOCK_MONOTONIC` of a ROS time, 0 for one before the machine started. \[ns\]
-pub fn moment(time: &roslibrust::codegen::integral_types::Time) -> u64 {
-    let stamp = i128::from(time.secs) * 1_000_000_000 + i128::from(time.nsecs);
-    u64::try_from(stamp - wall_ahead_ns()).unwrap_or(0)
-}
-
-/// How far the wall clock is ahead of `CLOCK_MONOTONIC`. A thread that is interrupted between the
-/// two readings would shift a stamp by that long, so they are taken again until they were close.
-fn wall_ahead_ns() -> i128 {
-    let read = || {
-        let before = now_ns();
-        let wall = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos());
-        let took = now_ns() - before;
-        (took, wall as i128 - i128::from(before + took / 2))
-    };
-    let mut best = read();
-    for _ in 0..20 {
-        if best.0 < 1_000 {
-            break;
-        }
-        best = best.min(read());
-    }
-    best.1
+    let (secs, nsecs) = wall_time(at_ns);
+    roslibrust::codegen::integral_types::Time { secs, nsecs: nsecs as i32 }
 }
 
 fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {

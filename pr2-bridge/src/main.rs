@@ -4,10 +4,7 @@
 mod args;
 mod endpoint;
 mod link;
-mod playout;
-mod stream;
 mod trajectory;
-mod whole;
 
 use std::process::ExitCode;
 
@@ -43,7 +40,7 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     // The executor's: no setpoint waits for whoever reads it.
-    let log = Log::install("pr2_bridge=info,warn");
+    let log = Log::install("pr2_bridge=info,nullsweep_bridge=info,warn");
     let result = match &cli.command {
         Command::Run(args) => endpoint::run(&cli.common, args),
         Command::Reset => link::call(&cli.common, link::Service::Reset),

@@ -1,8 +1,11 @@
 //! Messages to the arm's controller.
 
-use crate::link::msgs::trajectory_msgs;
+use nullsweep_bridge::{Goal, Message, Point};
+use nullsweep_ipc_types::ports::now_ns;
+
+use crate::endpoint::DOF;
+use crate::link::msgs::{control_msgs, trajectory_msgs};
 use crate::link::ros_time;
-use crate::stream::{Joints, Message};
 
 /// A message as the controller takes it.
 pub fn trajectory(message: &Message, names: &[String]) -> trajectory_msgs::JointTrajectory {
@@ -10,23 +13,31 @@ pub fn trajectory(message: &Message, names: &[String]) -> trajectory_msgs::Joint
     out.header.seq = message.sequence;
     out.header.stamp = ros_time(message.start_ns);
     out.joint_names = names.to_vec();
-    out.points = message.points.iter().map(|p| point(&p.q, Some(&p.v), p.after_ns)).collect();
+    out.points = message.points.iter().map(|p| point(p, true)).collect();
+    out
+}
+
+/// A whole plan as the controller's action takes it.
+pub fn action_goal(goal: &Goal, names: &[String]) -> control_msgs::FollowJointTrajectoryActionGoal {
+    let mut out = control_msgs::FollowJointTrajectoryActionGoal::default();
+    out.header.stamp = ros_time(now_ns());
+    out.goal_id.stamp = out.header.stamp.clone();
+    out.goal_id.id = goal.id.clone();
+    out.goal.trajectory.header.stamp = ros_time(goal.start_ns);
+    out.goal.trajectory.joint_names = names.to_vec();
+    out.goal.trajectory.points = goal.points.iter().map(|p| point(p, goal.curved)).collect();
     out
 }
 
 /// A point; without velocities the controller goes straight.
-pub fn point(
-    q: &Joints,
-    v: Option<&Joints>,
-    after_ns: u64,
-) -> trajectory_msgs::JointTrajectoryPoint {
+fn point(point: &Point, curved: bool) -> trajectory_msgs::JointTrajectoryPoint {
     let time_from_start = roslibrust::codegen::integral_types::Duration {
-        sec: (after_ns / 1_000_000_000) as i32,
-        nsec: (after_ns % 1_000_000_000) as i32,
+        sec: (point.after_ns / 1_000_000_000) as i32,
+        nsec: (point.after_ns % 1_000_000_000) as i32,
     };
     trajectory_msgs::JointTrajectoryPoint {
-        positions: q.to_vec(),
-        velocities: v.map_or_else(Vec::new, |v| v.to_vec()),
+        positions: point.q[..DOF].to_vec(),
+        velocities: if curved { point.v[..DOF].to_vec() } else { Vec::new() },
         time_from_start,
         ..Default::default()
     }

@@ -17,7 +17,7 @@ use crate::guard::Guard;
 use crate::interpolate::{PlanKnot, top_speed};
 use crate::total::{greater, within};
 use crate::{JointVector, MAX_DOF};
-use motion::{check_corners, check_end, check_segments};
+use motion::{check_corners, check_end, check_jerk, check_segments};
 
 pub(crate) use plan::Shape;
 pub use plan::{Join, ValidPlan};
@@ -85,8 +85,10 @@ pub fn admit(
         return Err(Rejection::new(Reason::Robot).value(value, bound));
     }
     check_held(header, held, rules)?;
-    let mut plan = ValidPlan::new(header.id, join, shape, read(knots, joints)?, 0.0);
+    let mut plan =
+        ValidPlan::new(header.id, join, shape, header.verified != 0, read(knots, joints)?, 0.0);
     check_segments(&plan, &rules.guard)?;
+    check_jerk(&plan, &rules.guard)?;
     check_end(&plan, &rules.guard)?;
     check_corners(&plan, &rules.guard)?;
     set_ramps(&mut plan, &rules.guard);

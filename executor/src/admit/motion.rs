@@ -1,19 +1,22 @@
 //! How a plan moves, against the executor's own limits.
 //!
 //! What is bounded: positions everywhere, with the braking margin at each segment's speed;
-//! velocities everywhere; of curves the acceleration everywhere and the jerk within each segment,
-//! where the URDF gives a limit of it. Between two curves the acceleration may step, by no more
-//! than its limits leave room for. Straight segments have neither, but corners: steps of the
-//! velocity, which are bang-bang where the plan asks for them, and else no more than a cycle's
-//! worth.
+//! velocities everywhere; of curves the acceleration everywhere and, where the URDF gives a limit of
+//! it, the jerk, within each segment and as the setpoints show it from one to the next: a step of the
+//! acceleration is as much jerk as it takes a cycle to make. Without such a limit the acceleration
+//! may step, by no more than its own limits leave room for. Straight segments have neither, but
+//! corners: steps of the velocity, which are bang-bang where the plan asks for them, and else no
+//! more than a cycle's worth.
 
 use nullsweep_ipc_types::{Interpolation, Reason};
 
-use super::plan::ValidPlan;
+use super::plan::{Join, ValidPlan};
 use super::rejection::Rejection;
 use crate::JointVector;
 use crate::guard::Guard;
-use crate::interpolate::{reach, sample, top_acceleration, top_jerk, top_speed};
+use crate::interpolate::{
+    acceleration, ends, reach, sample, top_acceleration, top_jerk, top_speed,
+};
 
 /// A planner rounds its times to whole nanoseconds, so a segment may be this much too short. \[s\]
 const ROUNDING_S: f64 = 1e-9;
@@ -58,6 +61,52 @@ pub(super) fn check_segments(plan: &ValidPlan, guard: &Guard) -> Result<(), Reje
         }
     }
     Ok(())
+}
+
+/// What setpoints a cycle apart show of a curve's jerk, whatever their phase: the acceleration
+/// changes in no cycle by more than each joint's limit lets it. Before its first knot and after its
+/// last one the arm holds; what a plan that joins another one at a knot begins with is judged there.
+pub(super) fn check_jerk(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
+    let limited: Vec<usize> =
+        (0..guard.used().len()).filter(|&j| guard.joints[j].limits.jerk.is_some()).collect();
+    if limited.is_empty() || plan.interpolation() == Interpolation::Linear {
+        return Ok(());
+    }
+    let (cycle, times) = (guard.period_ns as f64, plan.times());
+    // Straight in time between knots: a change over a cycle is greatest where the cycle begins or
+    // ends in a knot, just before it or just after.
+    for (knot, &time) in times.iter().enumerate() {
+        for begin in [time - cycle, time] {
+            for just_after in [false, true] {
+                let [from, to] = [begin, begin + cycle].map(|at| segment(times, at, just_after));
+                for &j in &limited {
+                    let from = acceleration_in(plan, from, begin, j);
+                    let to = acceleration_in(plan, to, begin + cycle, j);
+                    guard.allows_step(j, from, to).map_err(|(shown, most)| {
+                        Rejection::new(Reason::Jerk).knot(knot).joint(j).value(shown, most)
+                    })?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// How many knots are behind a moment: those at that very moment too, where it is `just_after` them.
+fn segment(times: &[f64], at: f64, just_after: bool) -> usize {
+    times.partition_point(|&t| t < at || just_after && t == at)
+}
+
+/// A joint's acceleration after that many knots. \[rad/s²\]
+fn acceleration_in(plan: &ValidPlan, passed: usize, time: f64, joint: usize) -> f64 {
+    let (kind, knots) = (plan.interpolation(), plan.knots());
+    match (passed.checked_sub(1).and_then(|k| knots.get(k)), knots.get(passed)) {
+        (Some(a), Some(b)) => acceleration(a, b, kind, joint, time),
+        (None, Some(_)) if matches!(plan.join(), Join::Knot { .. }) => {
+            knots.get(1).map_or(0.0, |b| ends(&knots[0], b, kind, joint)[0])
+        }
+        _ => 0.0,
+    }
 }
 
 /// A curve must come to rest: after its last knot the arm holds.

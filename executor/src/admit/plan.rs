@@ -36,6 +36,7 @@ pub struct ValidPlan {
     id: PlanId,
     join: Join,
     shape: Shape,
+    verified: bool,
     pub(super) knots: Vec<PlanKnot>,
     /// The knots' times once more, close together, to be searched.
     times: Vec<f64>,
@@ -48,11 +49,12 @@ impl ValidPlan {
         id: PlanId,
         join: Join,
         shape: Shape,
+        verified: bool,
         knots: Vec<PlanKnot>,
         waited: f64,
     ) -> Self {
         let times = knots.iter().map(|k| k.time).collect();
-        Self { id, join, shape, knots, times, waited }
+        Self { id, join, shape, verified, knots, times, waited }
     }
 
     /// The time from its publication to the end of its check, which the loop tells with its
@@ -90,6 +92,13 @@ impl ValidPlan {
     #[must_use]
     pub fn has_corners(&self) -> bool {
         self.shape.corners
+    }
+
+    /// Whether its sender says that the planner's last check passed it. Whatever the sender says,
+    /// the executor's own rules are kept.
+    #[must_use]
+    pub fn is_verified(&self) -> bool {
+        self.verified
     }
 
     /// At least two knots, times from 0 and rising strictly.

@@ -168,6 +168,8 @@ pub struct Snapshot {
     pub fault: Fault,
     /// The plan in execution.
     pub plan: PlanId,
+    /// Whether that plan is one that its sender does not call verified.
+    pub unverified: bool,
     /// Its knot.
     pub knot: u32,
     /// Time within it, 0 on the connector to its first knot. \[ns\]

@@ -8,6 +8,7 @@ use super::exchange::Output;
 use super::state::{State, StopCause, Turn};
 use crate::JointVector;
 use crate::admit::{Rejection, ValidPlan};
+use crate::fit::starts_at;
 use crate::guard::Guard;
 use crate::interpolate::Sample;
 use crate::path::Path;
@@ -125,7 +126,7 @@ impl State {
 
     /// Starts a plan that was accepted earlier, if it still fits.
     fn start_waiting(&mut self, plan: Arc<ValidPlan>, rate: f64, guard: &Guard, out: &mut Output) {
-        match Self::starts_at(&plan, &self.q, guard) {
+        match starts_at(&plan, &self.q, guard) {
             Ok(()) => self.begin(plan, rate, guard, out),
             Err(why) => {
                 out.tell(plan.id(), EventKind::Aborted, why);

@@ -10,10 +10,9 @@ use nullsweep_ipc_types::{EventKind, Fault, Mode, PlanId, Reason};
 
 use super::exchange::Output;
 use super::state::{State, StopCause, Turn, Waiting};
-use crate::JointVector;
 use crate::admit::{Join, Rejection, ValidPlan};
+use crate::fit::{joins_at, starts_at};
 use crate::guard::Guard;
-use crate::interpolate::sample;
 use crate::path::Path;
 
 impl State {
@@ -70,30 +69,6 @@ impl State {
         self.mode = Mode::Executing;
     }
 
-    /// Whether the plan's first knot is where the arm holds.
-    pub(super) fn starts_at(
-        plan: &ValidPlan,
-        holds: &JointVector,
-        guard: &Guard,
-    ) -> Result<(), Rejection> {
-        let Some(first) = plan.knots().first() else { return Ok(()) };
-        let start = Rejection::new(Reason::Start).knot(0);
-        if let Some((joint, apart)) = guard.farthest(holds, &first.q, guard.start_tolerance) {
-            return Err(start.joint(joint).value(apart, guard.start_tolerance));
-        }
-        // The way there must keep the braking margin. Whole turns are only of joints without one.
-        for j in 0..guard.used().len() {
-            if guard.approach(j, holds[j], first.q[j]).is_none() {
-                let (lower, upper) = guard.joints[j].limits_at(0.0);
-                let ahead = if first.q[j] > holds[j] { upper } else { lower };
-                let near = Rejection::new(Reason::SoftLimit).knot(0).joint(j);
-                return Err(near.value(first.q[j], ahead));
-            }
-        }
-        // One that is already under way at its first knot cannot start from a stand-still.
-        if plan.has_corners() { Ok(()) } else { meet(&JointVector::ZERO, &speed_from(plan), guard) }
-    }
-
     /// When the plan's turn comes, `None` for at once.
     fn turn(
         &self,
@@ -111,12 +86,12 @@ impl State {
             (Mode::Init | Mode::Fault, _) => Err(not_ready),
             (_, None) => match plan.join() {
                 Join::Knot { .. } => Err(Rejection::new(Reason::JoinPlan)),
-                Join::Stop | Join::After => Self::starts_at(plan, &self.q, guard).map(|()| None),
+                Join::Stop | Join::After => starts_at(plan, &self.q, guard).map(|()| None),
             },
             (_, Some(path)) => match plan.join() {
                 Join::Stop => {
                     let holds = path.predict_stop(guard).ok_or(not_ready)?;
-                    Self::starts_at(plan, &holds, guard).map(|()| Some(Turn::Stopped))
+                    starts_at(plan, &holds, guard).map(|()| Some(Turn::Stopped))
                 }
                 Join::After => self.after(plan, path, guard).map(|()| Some(Turn::After)),
                 Join::Knot { plan: joined, knot } => {
@@ -132,7 +107,7 @@ impl State {
         }
         let last = self.queue.back().and_then(|w| w.plan.knots().last());
         let holds = last.map_or_else(|| path.end(), |k| k.q);
-        Self::starts_at(plan, &holds, guard)
+        starts_at(plan, &holds, guard)
     }
 
     fn at_knot(
@@ -148,40 +123,6 @@ impl State {
         }
         let passed = Rejection::new(Reason::JoinKnot).value(knot as f64, path.knot() as f64);
         let at = path.upcoming(knot).ok_or(passed)?;
-        let Some(first) = plan.knots().first() else {
-            return Err(Rejection::new(Reason::Malformed));
-        };
-        let start = Rejection::new(Reason::Start).knot(0);
-        if let Some((joint, apart)) = guard.farthest(&at.q, &first.q, guard.join_tolerance) {
-            return Err(start.joint(joint).value(apart, guard.join_tolerance));
-        }
-        let (before, after) = (path.speed_into(knot), speed_from(plan));
-        match (path.plan().has_corners(), plan.has_corners()) {
-            // A corner as bang-bang plans have them.
-            (true, true) => Ok(()),
-            (false, false) => meet(&before, &after, guard),
-            // A bang-bang plan also begins and ends at speed where the arm stands.
-            (false, true) => meet(&before, &after, guard)
-                .or_else(|why| meet(&before, &JointVector::ZERO, guard).map_err(|_| why)),
-            (true, false) => meet(&before, &after, guard)
-                .or_else(|why| meet(&JointVector::ZERO, &after, guard).map_err(|_| why)),
-        }
+        joins_at(plan, path.plan(), knot, &at.q, guard)
     }
-}
-
-/// The velocity with which a plan leaves its first knot. \[rad/s\]
-fn speed_from(plan: &ValidPlan) -> JointVector {
-    match plan.knots() {
-        [a, b, ..] => sample(a, b, plan.interpolation(), a.time).v,
-        _ => JointVector::ZERO,
-    }
-}
-
-/// Whether a motion can go over into another one: velocities differ by no more than each joint may
-/// change in a cycle.
-fn meet(before: &JointVector, after: &JointVector, guard: &Guard) -> Result<(), Rejection> {
-    guard.matches_velocity(before, after).map_err(|(joint, step)| {
-        let bound = guard.velocity_tolerance(joint);
-        Rejection::new(Reason::Start).knot(0).joint(joint).value(step, bound)
-    })
 }

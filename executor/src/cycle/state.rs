@@ -121,6 +121,7 @@ impl State {
             mode: self.mode,
             fault: self.fault,
             plan: path.map_or(PlanId::NONE, |p| p.plan().id()),
+            unverified: path.is_some_and(|p| !p.plan().is_verified()),
             knot: path.map_or(0, |p| small(p.knot())),
             plan_time_ns: path.map_or(0, |p| p.progress().time.max(0.0) as u64),
             rate: path.map_or(0.0, |p| p.progress().rate),

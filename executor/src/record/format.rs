@@ -15,7 +15,7 @@ use crate::interpolate::PlanKnot;
 use crate::{JointVector, MAX_DOF};
 
 /// The first bytes of a recording; the digit is the version.
-pub(crate) const MAGIC: &[u8; 8] = b"NSWREC5\n";
+pub(crate) const MAGIC: &[u8; 8] = b"NSWREC6\n";
 
 /// What a record holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,7 +155,7 @@ pub(crate) struct PlanRecord {
     join: u32,
     interpolation: u32,
     corners: u32,
-    reserved: u32,
+    verified: u32,
     /// See [`ValidPlan::waited`].
     waited: f64,
 }
@@ -170,7 +170,8 @@ impl From<&ValidPlan> for PlanRecord {
         let interpolation = plan.interpolation().wire();
         let (id, waited) = (plan.id(), plan.waited());
         let corners = u32::from(plan.has_corners());
-        Self { id, join_plan, join_knot, join, interpolation, corners, reserved: 0, waited }
+        let verified = u32::from(plan.is_verified());
+        Self { id, join_plan, join_knot, join, interpolation, corners, verified, waited }
     }
 }
 
@@ -190,7 +191,7 @@ pub(crate) fn plan(payload: &[u8]) -> Option<ValidPlan> {
     };
     let interpolation = Interpolation::from_wire(head.interpolation)?;
     let shape = Shape { interpolation, corners: head.corners != 0 };
-    Some(ValidPlan::new(head.id, join, shape, knots, head.waited))
+    Some(ValidPlan::new(head.id, join, shape, head.verified != 0, knots, head.waited))
 }
 
 /// The state after a cycle was handed over as a checkpoint.

@@ -72,6 +72,9 @@ fn state<'a>(t: &Telemetry, answer: &'a str) -> Line<'a> {
         let fault = Fault::from_wire(t.fault).map_or("unknown fault", Fault::text);
         spans.push(Span::styled(format!("  {fault}"), Color::Red));
     }
+    if t.unverified != 0 {
+        spans.push(Span::styled("  the plan is NOT VERIFIED", Color::Red));
+    }
     if !answer.is_empty() {
         spans.push(Span::raw(format!("   [{answer}]")));
     }

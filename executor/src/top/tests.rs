@@ -65,10 +65,22 @@ fn a_running_plan_is_shown_with_its_joints() {
     ] {
         assert!(text.contains(part), "no {part}:\n{text}");
     }
+    assert!(!text.contains("VERIFIED"), "{text}");
     // The one joint that is far off is red, the others are not.
     let cells = terminal.backend().buffer().content();
     let red: String = cells.iter().filter(|c| c.fg == Color::Red).map(|c| c.symbol()).collect();
     assert_eq!(red.trim(), "+0.1000");
+}
+
+#[test]
+fn a_plan_that_is_not_verified_is_told() {
+    let (mut board, now) = (board(), Instant::now());
+    board.hear(Telemetry { unverified: 1, ..executing() }, now);
+    let (text, terminal) = picture(&board, now, (110, 40));
+    assert!(text.contains("executing  the plan is NOT VERIFIED"), "{text}");
+    let cells = terminal.backend().buffer().content();
+    let red: String = cells.iter().filter(|c| c.fg == Color::Red).map(|c| c.symbol()).collect();
+    assert!(red.contains("NOT VERIFIED"), "{red}");
 }
 
 #[test]

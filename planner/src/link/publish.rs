@@ -68,6 +68,7 @@ pub enum PublishError {
 }
 
 /// Publishes the plan to `robot`'s executor and waits for its admission and, if asked, its end.
+/// The executor is told whether the plan is as it was verified, and tells it on while the plan runs.
 /// `seen` is called with every event of this plan. Returns the plan's id. An executor that dies
 /// meanwhile is noticed within a second.
 ///
@@ -83,6 +84,7 @@ pub fn publish(
     seen: &mut dyn FnMut(&PlanEvent),
 ) -> Result<PlanId, PublishError> {
     let (mut header, knots) = plan.message_parts()?;
+    header.verified = u32::from(plan.check_seal().is_ok());
     let ipc = Ipc::open(robot, root)?;
     let events = ipc.event_receiver()?;
     let mut publisher = ipc.plan_publisher(knots.len())?;

@@ -14,6 +14,23 @@ thread_local! {
     );
 }
 
+thread_local! {
+    static FOLDER: tempfile::TempDir = tempfile::tempdir().expect("a folder for names");
+}
+
+/// As [`with`], where the path's ending says what the file is.
+pub(crate) fn with_ending<T>(bytes: &[u8], ending: &str, read: impl FnOnce(&Path) -> T) -> T {
+    with(bytes, |path| {
+        FOLDER.with(|folder| {
+            let name = folder.path().join(format!("input.{ending}"));
+            if !name.is_symlink() {
+                std::os::unix::fs::symlink(path, &name).expect("a name for a file in memory");
+            }
+            read(&name)
+        })
+    })
+}
+
 /// Calls `read` with the path of a file that holds these bytes.
 pub(crate) fn with<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     FILE.with_borrow_mut(|file| {

@@ -1,4 +1,4 @@
-//! Untrusted inputs of Nullsweep as functions of bytes. The meshes of links are not among them.
+//! Untrusted inputs of Nullsweep as functions of bytes.
 //!
 //! A [`Target`] takes any bytes and gives them to the very function that would meet them: it never
 //! panics, always ends, and says whether they were taken. The fuzzer runs it (`fuzz/`), and so does a
@@ -7,10 +7,13 @@
 mod arm;
 mod file;
 mod gtsp;
+mod mesh;
 pub mod mutant;
 mod plan;
 mod poses;
 mod recording;
+mod register;
+mod room;
 mod scan;
 mod script;
 mod srdf;
@@ -44,6 +47,9 @@ pub const TARGETS: &[Target] = &[
     Target { name: "poses", run: poses::run, made: none, mutants: 5000 },
     Target { name: "tool", run: tool::run, made: tool::made, mutants: 5000 },
     Target { name: "gtsp", run: gtsp::run, made: none, mutants: 1000 },
+    Target { name: "mesh", run: mesh::run, made: none, mutants: 1000 },
+    Target { name: "room", run: room::run, made: room::made, mutants: 50 },
+    Target { name: "register", run: register::run, made: register::made, mutants: 10 },
 ];
 
 fn none() -> Vec<Vec<u8>> {

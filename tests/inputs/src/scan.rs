@@ -11,10 +11,15 @@ const POINTS: usize = 3000;
 const FORMATS: [Format; 5] = [Format::Pcd, Format::Ply, Format::Stl, Format::Obj, Format::Text];
 
 pub(crate) fn run(bytes: &[u8]) -> bool {
-    let read = |format| read_bytes(bytes, format, Path::new("scan"), &ReadOptions::default()).ok();
-    let scans: Vec<RawScan> = FORMATS.into_iter().filter_map(read).collect();
+    let scans = scans(bytes);
     scans.iter().for_each(ask);
     !scans.is_empty()
+}
+
+/// What the file is as each format that takes it.
+pub(crate) fn scans(bytes: &[u8]) -> Vec<RawScan> {
+    let read = |format| read_bytes(bytes, format, Path::new("scan"), &ReadOptions::default()).ok();
+    FORMATS.into_iter().filter_map(read).collect()
 }
 
 fn ask(raw: &RawScan) {

@@ -54,6 +54,7 @@ pub(crate) const CRATES: &[Crate] = &[
         ],
     ),
     with("executor", &["ipc-types", "robot"]),
+    with("bridge", &["ipc-types", "robot", "executor"]),
     Crate { dir: "tests", may: May::ImportAll, dev: &[] },
     with(
         "tests/inputs",
@@ -68,7 +69,8 @@ pub(crate) const CRATES: &[Crate] = &[
         ],
     ),
     with("fuzz", &["tests/inputs"]),
-    with("pr2-bridge", &["ipc-types", "robot", "executor"]),
+    with("pr2-bridge", &["ipc-types", "robot", "executor", "bridge"]),
+    with("ros2-bridge", &["ipc-types", "robot", "executor", "bridge"]),
 ];
 
 /// Crates that share the wire and nothing else: no way may lead from one to the other.
@@ -141,7 +143,7 @@ pub(crate) const APART: &[(&str, &str, &[&str])] = &[
 /// Libraries of others, and the only folders that may name them.
 pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("parry3d-f64", &["planner/collision"]),
-    ("clap", &["planner/cli", "executor", "tests", "pr2-bridge"]),
+    ("clap", &["planner/cli", "executor", "tests", "pr2-bridge", "ros2-bridge"]),
     ("ratatui", &["executor/src/top"]),
     ("indicatif", &["planner/cli"]),
     ("plotly", &["tests"]),
@@ -153,7 +155,7 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
 pub(crate) const REFUSALS: &[&str] = &["ViolationKind", "Reason", "Fault"];
 
 /// Programs whose subcommands the documents may name.
-pub(crate) const PROGRAMS: &[&str] = &["planner", "executor", "pr2-bridge"];
+pub(crate) const PROGRAMS: &[&str] = &["planner", "executor", "pr2-bridge", "ros2-bridge"];
 
 /// The most lines of a file.
 pub(crate) const FILE_LINES: usize = 450;

@@ -191,3 +191,65 @@ fn a_first_knot_near_a_soft_limit_is_reached_or_refused() {
     }
     assert!(seen[0] > 100 && seen[1] > 500, "{seen:?}");
 }
+
+/// Joint 0 by 0.1 rad in a second, by a jerk of 3.2 rad/s³ in turns.
+fn gentle(guard: &Guard) -> std::sync::Arc<ValidPlan> {
+    let share = [(0.0, 0.0), (1.0 / 12.0, 1.0), (0.5, 2.0), (11.0 / 12.0, 1.0), (1.0, 0.0)];
+    let points: Vec<_> =
+        (0..).zip(share).map(|(k, (way, _))| (k * 250 * MS, moved(HOME, 0, 0.1 * way))).collect();
+    plan_with(guard, 1, &points, |h, knots| {
+        h.interpolation = Interpolation::Cubic.wire();
+        h.verified = 1;
+        knots.iter_mut().zip(share).for_each(|(k, (_, speed))| k.velocities[0] = 0.1 * speed);
+    })
+}
+
+/// Where a joint has a jerk limit, a plan takes over only with the acceleration that is there.
+#[test]
+fn a_join_makes_no_step_of_the_acceleration_beyond_a_jerk_limit() {
+    let mut guard = pr2();
+    guard.joints[0].limits.jerk = Some(5.0);
+    let first = gentle(&guard);
+    let at = first.knots()[1];
+    let curve = |number, points: &[(u64, f64, f64)]| {
+        let places: Vec<_> = points.iter().map(|(t, q, _)| (t * MS, moved(at.q, 0, *q))).collect();
+        plan_with(&guard, number, &places, |h, knots| {
+            h.interpolation = Interpolation::Cubic.wire();
+            h.join_rule = JoinRule::AtKnot.wire();
+            (h.join_plan, h.join_knot) = (id(1), 1);
+            knots.iter_mut().zip(points).for_each(|(k, (_, _, v))| k.velocities[0] = *v);
+        })
+    };
+    // There it speeds up at 0.8 rad/s², at 0.1 rad/s. One goes on so, the other at an even speed.
+    let even = [(0, 0.0, 0.1), (100, 0.01, 0.1), (300, 0.08 / 3.0, 0.05), (500, 0.03, 0.0)];
+    let tail =
+        [(0, 0.0, 0.1), (250, 0.5 / 12.0, 0.2), (500, 1.0 / 12.0, 0.1), (750, 1.1 / 12.0, 0.0)];
+    let mut sim = Sim::holding(guard);
+    only(&sim.offer(first.clone()), Accepted);
+    let why = only(&sim.offer(curve(2, &even)), Rejected).why;
+    assert_eq!((why.reason, why.joint), (Reason::Jerk, 0), "{why}");
+    assert!((why.value - 800.0).abs() < 1e-6 && (why.bound - 5.0).abs() < 1e-9, "{why}");
+    only(&sim.offer(curve(3, &tail)), Accepted);
+    sim.run_until(Mode::Hold, 2000);
+    assert_eq!(sim.story(3), [Accepted, Started, Finished]);
+    // Without a limit both may.
+    let mut sim = Sim::holding(pr2());
+    only(&sim.offer(gentle(&pr2())), Accepted);
+    only(&sim.offer(curve(2, &even)), Accepted);
+}
+
+/// While a plan is executed that its sender does not call verified, everybody is told.
+#[test]
+fn a_plan_that_is_not_verified_is_told_while_it_runs() {
+    let mut sim = Sim::holding(pr2());
+    assert!(!sim.state.snapshot().unverified);
+    only(&sim.offer(gentle(&pr2())), Accepted);
+    sim.run(10);
+    assert!(sim.state.snapshot().plan == id(1) && !sim.state.snapshot().unverified);
+    let mut sim = Sim::holding(pr2());
+    only(&sim.offer(plan(&pr2(), 2, JoinRule::StopThenStart, &line(HOME))), Accepted);
+    sim.run(10);
+    assert!(sim.state.snapshot().plan == id(2) && sim.state.snapshot().unverified);
+    sim.run_until(Mode::Hold, 2000);
+    assert!(!sim.state.snapshot().unverified);
+}

@@ -1,6 +1,10 @@
 //! A controller that takes messages, and setpoints with every trouble.
 
+use nullsweep_robot::MAX_DOF;
+
 use super::*;
+
+const DOF: usize = 7;
 
 const MS: u64 = 1_000_000;
 /// The PR2's forearm and wrist turn without end.
@@ -8,6 +12,8 @@ const TURNS: [bool; 8] = [false, false, false, false, true, false, true, false];
 
 fn rules() -> Rules {
     Rules {
+        joints: DOF,
+        takeover: Takeover::AtStamp,
         delay_ns: 60 * MS,
         timeout_ns: 20 * MS,
         stop_acceleration: 4.0,
@@ -33,7 +39,7 @@ fn messages_join_where_setpoints_end_and_come_to_rest() {
     let mut messages = Vec::new();
     for k in 1..=100u64 {
         let s = setpoint(k, 1e-3 * k as f64, 1.0);
-        stream.take(&s, &std::array::from_fn(|j| s.positions[j]));
+        stream.take(&s, &JointVector::from_fn(|j| s.positions[j]));
         if k % 20 == 0 {
             messages.extend(stream.message(1000 * MS + k * MS));
         }
@@ -50,7 +56,7 @@ fn messages_join_where_setpoints_end_and_come_to_rest() {
         assert!(message.points.windows(2).all(|w| w[1].after_ns > w[0].after_ns));
         let [.., last, rest] = message.points[..] else { panic!("two points") };
         // 1 rad/s is stopped in 0.25 s over 0.125 rad.
-        assert_eq!(rest.v, [0.0; DOF]);
+        assert_eq!(rest.v, JointVector::ZERO);
         assert!((rest.q[0] - last.q[0] - 0.125).abs() < 1e-12);
         assert_eq!(rest.after_ns - last.after_ns, 250 * MS);
     }
@@ -61,11 +67,11 @@ fn messages_join_where_setpoints_end_and_come_to_rest() {
 #[test]
 fn what_is_too_late_or_too_far_is_not_followed() {
     let mut stream = Stream::new(rules());
-    stream.take(&setpoint(1, 0.1, 0.0), &[0.0; DOF]);
+    stream.take(&setpoint(1, 0.1, 0.0), &JointVector::ZERO);
     assert!(!stream.follows() && stream.refused == 1);
     // It says that it waits, so that the executor's setpoints come to the arm.
     assert!(stream.stopped(1001 * MS) == Some(Stop::Far) && stream.in_force(2000 * MS).is_none());
-    stream.take(&setpoint(2, 0.01, 0.0), &[0.0; DOF]);
+    stream.take(&setpoint(2, 0.01, 0.0), &JointVector::ZERO);
     assert!(stream.follows() && stream.stopped(1002 * MS).is_none());
     assert_eq!(stream.in_force(2000 * MS), Some((2, 1002 * MS)));
     // The process stalled: its stamp would lie in the past.
@@ -73,7 +79,7 @@ fn what_is_too_late_or_too_far_is_not_followed() {
     assert!(!stream.follows() && stream.late == 1);
     let mut nan = setpoint(3, 0.0, 0.0);
     nan.positions[3] = f64::NAN;
-    stream.take(&nan, &[0.0; DOF]);
+    stream.take(&nan, &JointVector::ZERO);
     assert!(!stream.follows());
 }
 
@@ -117,7 +123,7 @@ fn following_begins_without_a_jump() {
     // The controller holds at 0, the arm is measured a little beside it.
     let (mut before, mut fastest) = (0.0, 0.0f64);
     for k in 1..=400u64 {
-        stream.take(&setpoint(k, 0.002, 0.0), &[0.001; DOF]);
+        stream.take(&setpoint(k, 0.002, 0.0), &JointVector::new([0.001; MAX_DOF]));
         if k % 20 == 0 {
             stream.message((1000 + k) * MS).iter().for_each(|m| controller.take(m));
         }
@@ -156,7 +162,7 @@ fn missed_deadlines_are_no_jump() {
             let mut s = setpoint(k, q, speed);
             s.deadline_ns = deadline + MS;
             // The arm stands a little beside the first setpoint.
-            stream.take(&s, &[0.0; DOF]);
+            stream.take(&s, &JointVector::ZERO);
         }
         assert_eq!(stream.late, 0);
         assert!((q - before[0]).abs() < 0.05 && (before[1] - 0.5).abs() < 0.2, "{before:?}");
@@ -167,7 +173,7 @@ fn missed_deadlines_are_no_jump() {
 #[test]
 fn what_came_too_late_is_told_until_it_follows_again() {
     let mut stream = Stream::new(rules());
-    let mut measured = [0.0; DOF];
+    let mut measured = JointVector::ZERO;
     for k in 1..=20 {
         stream.take(&setpoint(k, 1e-3 * k as f64, 1.0), &measured);
     }
@@ -181,7 +187,7 @@ fn what_came_too_late_is_told_until_it_follows_again() {
     stream.take(&setpoint(100, 0.1, 0.0), &measured);
     assert!(!stream.follows() && stream.stopped(1100 * MS).is_some());
     let k = (rest_ns - 60 * MS) / MS - 1000 + 1;
-    stream.take(&setpoint(k, 0.14, 0.0), &[0.14; DOF].map(|q| q * measured[0].signum()));
+    stream.take(&setpoint(k, 0.14, 0.0), &JointVector::new([0.14; MAX_DOF]));
     assert!(!stream.follows(), "the other joints are far");
     measured[0] = 0.14;
     stream.take(&setpoint(k + 1, 0.14, 0.0), &measured);
@@ -193,7 +199,7 @@ fn standing_still_sends_one_message_and_ceasing_lets_go() {
     let mut stream = Stream::new(rules());
     let mut count = 0;
     for k in 1..=100u64 {
-        stream.take(&setpoint(k, 0.0, 0.0), &[0.0; DOF]);
+        stream.take(&setpoint(k, 0.0, 0.0), &JointVector::ZERO);
         if k % 20 == 0 {
             count += usize::from(stream.message(1000 * MS + k * MS).is_some());
         }
@@ -209,7 +215,7 @@ fn standing_still_sends_one_message_and_ceasing_lets_go() {
 fn whole_turns_are_no_way_to_go() {
     for (joint, begins) in [(4, true), (6, true), (0, false)] {
         let mut stream = Stream::new(rules());
-        let mut measured = [0.0; DOF];
+        let mut measured = JointVector::ZERO;
         measured[joint] = -3.0 * core::f64::consts::TAU + 0.01;
         for k in 1..=20u64 {
             let mut s = setpoint(k, 0.0, 0.0);
@@ -230,12 +236,80 @@ fn whole_turns_are_no_way_to_go() {
 fn another_executor_hears_nothing_of_the_first_ones_setpoints() {
     let mut stream = Stream::new(rules());
     for k in 5000..5100u64 {
-        stream.take(&setpoint(k, 0.0, 0.0), &[0.0; DOF]);
+        stream.take(&setpoint(k, 0.0, 0.0), &JointVector::ZERO);
     }
     assert_eq!(stream.in_force(6170 * MS).map(|(sequence, _)| sequence), Some(5099));
     let mut first = setpoint(1, 0.0, 0.0);
     first.deadline_ns = 6200 * MS;
-    stream.take(&first, &[0.0; DOF]);
+    stream.take(&first, &JointVector::ZERO);
     assert_eq!(stream.in_force(6210 * MS), None, "none of its own is in force yet");
     assert_eq!(stream.in_force(6270 * MS).map(|(sequence, _)| sequence), Some(1));
+}
+
+/// A controller that leaves a message when the next one comes: from where it is to the first point.
+#[derive(Default)]
+struct Jtc {
+    /// Time, position and velocity.
+    points: Vec<(u64, [f64; 2])>,
+}
+
+impl Jtc {
+    fn at(&self, now: u64) -> [f64; 2] {
+        let next = self.points.iter().position(|p| p.0 > now);
+        match next {
+            None => self.points.last().map_or([0.0; 2], |p| [p.1[0], 0.0]),
+            Some(0) => self.points[0].1,
+            Some(next) => {
+                let ((t0, from), (t1, to)) = (self.points[next - 1], self.points[next]);
+                Controller { segments: vec![(t0, t1, [from, to])] }.at(now)
+            }
+        }
+    }
+
+    fn take(&mut self, message: &Message, now: u64) {
+        let from = (now, self.at(now));
+        let later = message.points.iter().filter_map(|p| {
+            let at = message.start_ns + p.after_ns;
+            (at > now).then_some((at, [p.q[0], p.v[0]]))
+        });
+        self.points = std::iter::once(from).chain(later).collect();
+    }
+}
+
+/// Whenever messages come, within the delay, and though some never do, such a controller goes on as
+/// it did: what lies ahead is in each of them.
+#[test]
+fn a_controller_that_splices_on_arrival_goes_on_as_it_did() {
+    for (latency, lost) in [(0, 0), (3, 0), (4, 3), (12, 2), (25, 0)] {
+        let mut stream = Stream::new(Rules { takeover: Takeover::AtArrival, ..rules() });
+        let mut controller = Jtc::default();
+        let (mut on_the_way, mut sent) = (std::collections::VecDeque::new(), 0u64);
+        let (mut before, mut steepest, mut farthest) = ([0.0; 2], 0.0f64, 0.0f64);
+        for k in 1..=4000u64 {
+            let now = (1000 + k) * MS;
+            // Still for a second, then a sine of at most 0.5 rad/s and 1.6 rad/s².
+            let t = k.saturating_sub(1000) as f64 * 1e-3;
+            let place = |t: f64| 0.15 * (1.0 - (3.3 * t).cos());
+            stream.take(&setpoint(k, place(t), 0.495 * (3.3 * t).sin()), &JointVector::ZERO);
+            if k % 20 == 0 {
+                sent += 1;
+                let arrives = now + (latency + sent % 3) * MS;
+                // Every so many, as many as that in a row at most one.
+                let through = lost == 0 || sent % (2 * lost) != 0;
+                on_the_way.extend(stream.message(now).filter(|_| through).map(|m| (arrives, m)));
+            }
+            while on_the_way.front().is_some_and(|(at, _)| *at <= now) {
+                let (_, message) = on_the_way.pop_front().expect("one");
+                controller.take(&message, now);
+            }
+            let at = controller.at(now);
+            steepest = steepest.max((at[1] - before[1]).abs() / 1e-3);
+            before = at;
+            let followed = place((k.saturating_sub(1000 + 60)) as f64 * 1e-3);
+            farthest = farthest.max((at[0] - followed).abs());
+        }
+        assert_eq!(stream.late, 0);
+        assert!(steepest < 2.5, "{latency} ms, {lost} lost: {steepest} rad/s²");
+        assert!(farthest < 1e-3, "{latency} ms, {lost} lost: {farthest} rad beside the way");
+    }
 }

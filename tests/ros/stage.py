@@ -1,32 +1,29 @@
-"""Processes around a rosmaster: what the scenarios of `run` have in common."""
+"""Processes around a bridge: what the scenes of tests/ros1 and tests/ros2 have in common."""
 
 import os
 import pathlib
 import signal
-import socket
 import subprocess
 import sys
 import time
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 # A desktop stalls now and then for longer than a robot would.
 PATIENT = ["--stale-ms", "100", "--lost-ms", "400"]
 
 
 class Stage:
-    """Processes that end with this one."""
+    """Processes that end with this one. Whoever derives it knows the robot's side: `start_robot`,
+    `bridge_command` and what the bridge says once it is connected, `CONNECTED`."""
 
-    def __init__(self, folder, ipc, bins, side):
+    CONNECTED = None
+
+    def __init__(self, folder, ipc, bins, side, env):
         self.folder, self.side, self.all = folder, side, []
         self.planner, self.executor, self.bridge = bins
         self.place = ["--ipc-root", str(ipc)]
         folder.mkdir(parents=True, exist_ok=True)
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            self.port = s.getsockname()[1]
-        self.env = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{self.port}",
-                        ROS_IP="127.0.0.1", ROS_LOG_DIR=str(folder / "ros"))
+        self.env = dict(os.environ, **env)
 
     def start(self, name, *command):
         log = open(self.folder / (name + ".log"), "w")
@@ -53,27 +50,20 @@ class Stage:
             time.sleep(0.05)
 
     def start_robot(self, plan):
-        """A rosmaster and the node that acts as the arm's controller, standing where `plan`
-        begins; what it saw is written to controller.json when it ends."""
-        self.master = self.start("rosmaster", "/usr/bin/python3", "/usr/bin/rosmaster", "--core",
-                                 "-p", self.port)
+        """What acts as the robot, its arm standing where `plan` begins; `self.arm` writes what it
+        saw to controller.json when it ends."""
+        raise NotImplementedError
 
-        def answers():
-            with socket.socket() as s:
-                return s.connect_ex(("127.0.0.1", self.port)) == 0
-
-        self.until("a master", answers)
-        self.arm = self.start("arm", "/usr/bin/python3", HERE / "pr2_arm.py", "--plan", plan,
-                              "--json", self.folder / "controller.json")
-        self.until("the arm", lambda: "pr2_arm: ready" in self.said("arm"))
+    def trouble(self, over):
+        """What shall make no difference, until it is `over`."""
 
     def start_bridge(self, *options):
-        self.bridge_process = self.start("bridge", self.bridge, "run", "--arm", self.side,
-                                         *self.place, *options)
-        self.until("the bridge", lambda: "controller listening" in self.said("bridge"))
+        self.bridge_process = self.start("bridge", *self.bridge_command(), *self.place, *options)
+        self.until("the bridge", lambda: self.CONNECTED in self.said("bridge"))
 
     def start_executor(self):
-        self.start("executor", self.executor, "run", "--arm", self.side, *self.place, *PATIENT)
+        self.executor_process = self.start("executor", self.executor, "run", "--arm", self.side,
+                                           *self.place, *PATIENT)
         self.until("hold", lambda: "hold" in self.status())
 
     def status(self):

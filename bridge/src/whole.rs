@@ -1,17 +1,17 @@
-//! Whole plans: each admitted by the executor's own rules and sent as one goal. A plan that joins
-//! another one in a knot takes its place there; the controller splices it.
+//! Whole plans: each admitted by the executor's own rules and given to the controller as one goal. A
+//! plan that joins another one in a knot takes its place there; the controller splices it.
 
-use nullsweep_executor::{Guard, Held, Ids, Join, Rejection, Rules, ValidPlan, admit};
-use nullsweep_ipc_types::ports::{Ipc, PlanReceiver, Sender, now_ns};
-use nullsweep_ipc_types::{
-    EventKind, Interpolation, JointStates, Knot, MAX_KNOTS, Mode, PlanEvent, Reason, Telemetry,
+use nullsweep_executor::{
+    Guard, Held, Ids, Join, Rejection, Rules, ValidPlan, admit, joins_at, starts_at,
 };
-use nullsweep_robot::{Arm, JointKind};
+use nullsweep_ipc_types::ports::{Ipc, IpcError, PlanReceiver, PortError, Sender, now_ns};
+use nullsweep_ipc_types::{
+    EventKind, Interpolation, JointStates, Knot, MAX_KNOTS, Mode, PlanEvent, PlanId, Reason,
+    Telemetry,
+};
+use nullsweep_robot::{Arm, JointKind, JointVector};
 
-use crate::link::msgs::control_msgs;
-use crate::link::{Link, Order, ros_time};
-use crate::stream::{DOF, Joints};
-use crate::trajectory::point;
+use crate::stream::Point;
 
 /// A goal starts so long after it is sent. \[ns\]
 const AHEAD_NS: u64 = 200_000_000;
@@ -19,8 +19,28 @@ const AHEAD_NS: u64 = 200_000_000;
 const CONNECT_NS: u64 = 500_000_000;
 /// Time between two telemetry samples. \[ns\]
 const TELL_NS: u64 = 10_000_000;
-/// The controller's code for an end as planned.
-const SUCCEEDED: u8 = 3;
+
+/// What the controller is to be given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Goal {
+    /// Names it, for [`Whole::ended`].
+    pub id: String,
+    /// When its points' time 0 is. \[ns, `CLOCK_MONOTONIC`\]
+    pub start_ns: u64,
+    /// At least one.
+    pub points: Vec<Point>,
+    /// Whether the points' velocities count; else the controller goes straight.
+    pub curved: bool,
+}
+
+/// What the controller is asked.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ask {
+    /// To take a goal, in place of one that it has.
+    Goal(Goal),
+    /// To hold.
+    Hold,
+}
 
 /// A goal that the controller has.
 struct Running {
@@ -38,7 +58,6 @@ pub struct Whole {
     telemetry: Sender<Telemetry>,
     rules: Rules,
     ids: Ids,
-    names: Vec<String>,
     state: Option<JointStates>,
     running: Option<Running>,
     event_count: u64,
@@ -48,19 +67,18 @@ pub struct Whole {
 
 impl Whole {
     /// Takes the executor's place at the plan service.
-    pub fn open(ipc: &Ipc, arm: &Arm) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// An executor runs already, or the services cannot be opened.
+    pub fn open(ipc: &Ipc, arm: &Arm) -> Result<Self, IpcError> {
         let robot = arm.robot();
-        let held_continuous = arm
-            .held_joints()
-            .iter()
-            .map(|h| {
-                robot.joints().iter().any(|j| j.name == h.name && j.kind == JointKind::Continuous)
-            })
-            .collect();
+        let turns = |name: &str| {
+            robot.joints().iter().any(|j| j.name == name && j.kind == JointKind::Continuous)
+        };
         let rules = Rules {
             guard: Guard::new(arm.limits()),
             fingerprint: arm.fingerprint(),
-            held_continuous,
+            held_continuous: arm.held_joints().iter().map(|h| turns(&h.name)).collect(),
             held_tolerance: Rules::HELD_TOLERANCE,
             since_ns: now_ns(),
         };
@@ -70,7 +88,6 @@ impl Whole {
             telemetry: ipc.telemetry_sender()?,
             rules,
             ids: Ids::default(),
-            names: arm.joint_names().to_vec(),
             state: None,
             running: None,
             event_count: 0,
@@ -84,8 +101,13 @@ impl Whole {
         self.state = Some(*state);
     }
 
-    /// Takes plans, watches the robot, tells how it goes. `ready`: the robot can move.
-    pub fn round(&mut self, ready: bool, link: &Link) -> anyhow::Result<()> {
+    /// Takes plans, watches the robot, tells how it goes; what the controller is to be asked.
+    /// `ready`: the robot can move.
+    ///
+    /// # Errors
+    /// [`PortError`] where plans cannot be received or events not be sent.
+    pub fn round(&mut self, ready: bool) -> Result<Vec<Ask>, PortError> {
+        let mut asks = Vec::new();
         while let Some(plan) = self.plans.receive()? {
             let header = *plan.header();
             let count = plan.knots().len().min(MAX_KNOTS);
@@ -97,7 +119,7 @@ impl Whole {
             let admitted = admit(&header, &knots, held.as_ref(), &self.rules, now_ns());
             let admitted = self.ids.judge(header.id, admitted);
             match admitted.and_then(|plan| self.fit(&plan, ready).map(|start| (plan, start))) {
-                Ok((plan, start)) => self.begin(plan, start, link)?,
+                Ok((plan, start)) => asks.push(Ask::Goal(self.begin(plan, start)?)),
                 Err(why) => {
                     tracing::warn!("plan {} rejected: {why}", header.id);
                     self.tell(header.id, EventKind::Rejected, why)?;
@@ -114,8 +136,7 @@ impl Whole {
             self.tell(id, EventKind::Started, Rejection::new(Reason::None))?;
         }
         if !ready && let Some(running) = self.running.take() {
-            // Halted motors, or no link: an empty trajectory makes the controller hold.
-            let _ = link.orders.send(Order::Command(Default::default()));
+            asks.push(Ask::Hold);
             tracing::error!("plan {} ended: the robot is not ready", running.plan.id());
             self.tell(running.plan.id(), EventKind::Aborted, Rejection::new(Reason::Fault))?;
         }
@@ -123,27 +144,28 @@ impl Whole {
             self.told_ns = now;
             self.show(ready, now)?;
         }
-        Ok(())
+        Ok(asks)
     }
 
-    /// Takes the end of a goal in.
-    pub fn ended(
-        &mut self,
-        result: &control_msgs::FollowJointTrajectoryActionResult,
-    ) -> anyhow::Result<()> {
-        let ours = |r: &Running| r.goal == result.status.goal_id.id;
-        let Some(running) = self.running.take_if(|r| ours(r)) else { return Ok(()) };
+    /// Takes the end of a goal in: `failed` says why where it is not as planned.
+    ///
+    /// # Errors
+    /// [`PortError`] where it cannot be told.
+    pub fn ended(&mut self, goal: &str, failed: Option<&str>) -> Result<(), PortError> {
+        let Some(running) = self.running.take_if(|r| r.goal == goal) else { return Ok(()) };
         let id = running.plan.id();
-        if result.status.status == SUCCEEDED {
+        let Some(why) = failed else {
             return self.tell(id, EventKind::Finished, Rejection::new(Reason::None));
-        }
-        let (code, text) = (result.result.error_code, &result.status.text);
-        tracing::error!("plan {id} ended by the controller: error {code} {text}");
+        };
+        tracing::error!("plan {id} ended by the controller: {why}");
         self.tell(id, EventKind::Aborted, Rejection::new(Reason::Fault))
     }
 
     /// Ends what runs.
-    pub fn close(&mut self) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    /// [`PortError`] where it cannot be told.
+    pub fn close(&mut self) -> Result<(), PortError> {
         match self.running.take() {
             Some(r) => self.tell(r.plan.id(), EventKind::Aborted, Rejection::new(Reason::Shutdown)),
             None => Ok(()),
@@ -153,80 +175,41 @@ impl Whole {
     /// When the plan's time 0 is, if it fits the moment.
     fn fit(&self, plan: &ValidPlan, ready: bool) -> Result<u64, Rejection> {
         let state = self.state.filter(|_| ready).ok_or(Rejection::new(Reason::NotReady))?;
-        let first = &plan.knots()[0];
         let guard = &self.rules.guard;
-        match (plan.join(), &self.running) {
-            (Join::Knot { plan: joined, knot }, Some(r)) if r.plan.id() == joined => {
-                let passed = Rejection::new(Reason::JoinKnot).value(knot as f64, f64::NAN);
-                let at = r.plan.knots().get(knot).ok_or(passed)?;
-                let start = r.start_ns + at.time as u64;
-                if start < now_ns() + AHEAD_NS / 2 {
-                    return Err(passed);
-                }
-                match guard.farthest(&at.q, &first.q, guard.join_tolerance) {
-                    Some((joint, by)) => {
-                        Err(Rejection::new(Reason::Start).joint(joint).value(by, 0.0))
-                    }
-                    None => Ok(start),
-                }
-            }
-            (Join::Knot { .. }, _) => Err(Rejection::new(Reason::JoinPlan)),
-            // The controller cannot stop on a path: only what joins in a knot replaces a plan.
-            (Join::Stop | Join::After, Some(_)) => Err(Rejection::new(Reason::QueueFull)),
-            (Join::Stop | Join::After, None) => {
-                let mut at = first.q;
-                at[..DOF].copy_from_slice(&state.positions[..DOF]);
-                let tolerance = guard.start_tolerance;
-                match guard.farthest(&at, &first.q, tolerance) {
-                    Some((joint, by)) => {
-                        Err(Rejection::new(Reason::Start).joint(joint).value(by, tolerance))
-                    }
-                    None => Ok(now_ns() + AHEAD_NS + CONNECT_NS),
-                }
-            }
-        }
+        let measured =
+            JointVector::from_fn(|j| if j < guard.dof { state.positions[j] } else { 0.0 });
+        let running = self.running.as_ref().map(|r| (&r.plan, r.start_ns));
+        fit(plan, running, &measured, guard, now_ns())
     }
 
-    /// Sends the plan as a goal.
-    fn begin(&mut self, plan: ValidPlan, start_ns: u64, link: &Link) -> anyhow::Result<()> {
+    /// The plan as a goal.
+    fn begin(&mut self, plan: ValidPlan, start_ns: u64) -> Result<Goal, PortError> {
         let id = plan.id();
         let joins = matches!(plan.join(), Join::Knot { .. });
-        let mut goal = control_msgs::FollowJointTrajectoryActionGoal::default();
-        goal.header.stamp = ros_time(now_ns());
-        goal.goal_id.stamp = goal.header.stamp.clone();
-        goal.goal_id.id = format!("nullsweep-{id}");
         let lead = if joins { 0 } else { CONNECT_NS };
-        goal.goal.trajectory.header.stamp = ros_time(start_ns - lead);
-        goal.goal.trajectory.joint_names = self.names.clone();
-        let curved = plan.interpolation() == Interpolation::Cubic;
-        // A joining plan's first knot is where the splice is.
-        goal.goal.trajectory.points = plan
-            .knots()
-            .iter()
-            .skip(usize::from(joins))
-            .map(|k| {
-                let q: Joints = std::array::from_fn(|j| k.q[j]);
-                let v: Joints = std::array::from_fn(|j| k.v[j]);
-                point(&q, curved.then_some(&v), k.time as u64 + lead)
-            })
-            .collect();
+        let goal = Goal {
+            id: format!("nullsweep-{id}"),
+            start_ns: start_ns - lead,
+            // A joining plan's first knot is where the splice is.
+            points: plan
+                .knots()
+                .iter()
+                .skip(usize::from(joins))
+                .map(|k| Point { after_ns: k.time as u64 + lead, q: k.q, v: k.v })
+                .collect(),
+            curved: plan.interpolation() == Interpolation::Cubic,
+        };
         let waited = now_ns().saturating_sub(id.epoch) as f64 * 1e-9;
         let told = Rejection::new(Reason::None).value(waited, plan.duration() * 1e-9);
-        let running = Running { goal: goal.goal_id.id.clone(), plan, start_ns, started: false };
-        link.orders.send(Order::Goal(Box::new(goal)))?;
+        let running = Running { goal: goal.id.clone(), plan, start_ns, started: false };
         self.tell(id, EventKind::Accepted, told)?;
         if let Some(old) = self.running.replace(running) {
             self.tell(old.plan.id(), EventKind::Superseded, Rejection::new(Reason::None))?;
         }
-        Ok(())
+        Ok(goal)
     }
 
-    fn tell(
-        &mut self,
-        plan: nullsweep_ipc_types::PlanId,
-        kind: EventKind,
-        why: Rejection,
-    ) -> anyhow::Result<()> {
+    fn tell(&mut self, plan: PlanId, kind: EventKind, why: Rejection) -> Result<(), PortError> {
         self.event_count += 1;
         tracing::info!("plan {plan} {kind}");
         self.events.send(&PlanEvent {
@@ -244,12 +227,12 @@ impl Whole {
     }
 
     /// Telemetry, so that planners can ask what runs.
-    fn show(&mut self, ready: bool, now: u64) -> anyhow::Result<()> {
+    fn show(&mut self, ready: bool, now: u64) -> Result<(), PortError> {
         self.sample_count += 1;
         let mut sample = <Telemetry as bytemuck::Zeroable>::zeroed();
         sample.sequence = self.sample_count;
         sample.stamp_ns = now;
-        sample.joint_count = DOF as u32;
+        sample.joint_count = self.rules.guard.dof as u32;
         sample.speed_scale = 1.0;
         sample.mode = if ready { Mode::Hold.wire() } else { Mode::Init.wire() };
         if let Some(state) = &self.state {
@@ -259,6 +242,7 @@ impl Whole {
         if let Some(r) = self.running.as_ref().filter(|r| now >= r.start_ns) {
             sample.mode = Mode::Executing.wire();
             sample.plan = r.plan.id();
+            sample.unverified = u32::from(!r.plan.is_verified());
             sample.plan_time_ns = now - r.start_ns;
             let passed = r.plan.knots().partition_point(|k| k.time as u64 <= sample.plan_time_ns);
             sample.knot = passed.saturating_sub(1) as u32;
@@ -267,3 +251,37 @@ impl Whole {
         Ok(())
     }
 }
+
+/// When the plan's time 0 is, if it fits the moment: what runs with its time 0, and where the arm is.
+/// \[ns\]
+///
+/// # Errors
+/// The reason for which the executor would refuse it too, or [`Reason::QueueFull`] for what a
+/// controller cannot do: stop on a path, or keep a plan for later.
+pub fn fit(
+    plan: &ValidPlan,
+    running: Option<(&ValidPlan, u64)>,
+    measured: &JointVector,
+    guard: &Guard,
+    now_ns: u64,
+) -> Result<u64, Rejection> {
+    match (plan.join(), running) {
+        (Join::Knot { plan: joined, knot }, Some((runs, start_ns))) if runs.id() == joined => {
+            let passed = Rejection::new(Reason::JoinKnot).value(knot as f64, f64::NAN);
+            let at = runs.knots().get(knot).ok_or(passed)?;
+            let start = start_ns + at.time as u64;
+            if start < now_ns + AHEAD_NS / 2 {
+                return Err(passed);
+            }
+            joins_at(plan, runs, knot, &at.q, guard).map(|()| start)
+        }
+        (Join::Knot { .. }, _) => Err(Rejection::new(Reason::JoinPlan)),
+        (Join::Stop | Join::After, Some(_)) => Err(Rejection::new(Reason::QueueFull)),
+        (Join::Stop | Join::After, None) => {
+            starts_at(plan, measured, guard).map(|()| now_ns + AHEAD_NS + CONNECT_NS)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -3,7 +3,8 @@
 //! Each message holds the setpoints since the last one, to be followed `delay` after they were
 //! due (see [`Playout`]), and ends in a stop: when messages cease, the arm slows down and holds by
 //! itself. The next message's stamp is where the last one's setpoints end, so that the controller
-//! splices it there and drops the stop.
+//! splices it there and drops the stop; or, where the controller splices on arrival, it begins with
+//! the last ones that are still ahead ([`Takeover`]).
 
 use std::collections::VecDeque;
 
@@ -11,11 +12,6 @@ use nullsweep_ipc_types::{Mode, Setpoint};
 use nullsweep_robot::{Continuous, JointVector};
 
 use crate::playout::Playout;
-
-/// Joints of the arm.
-pub const DOF: usize = 7;
-/// One value for each joint. \[rad\]
-pub type Joints = [f64; DOF];
 
 /// Setpoints whose place in time is remembered.
 const REMEMBERED: usize = 512;
@@ -36,9 +32,22 @@ const TRANSIT_NS: u64 = 5_000_000;
 /// setpoint is; so long it takes until that difference is gone. \[s\]
 const FADE: f64 = 0.5;
 
+/// When a controller leaves one message for the next one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takeover {
+    /// At the next one's stamp; until then it follows the last one.
+    AtStamp,
+    /// At once: from where it is, as it moves, to the next one's first point.
+    AtArrival,
+}
+
 /// How a stream works.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
+    /// Joints of the arm.
+    pub joints: usize,
+    /// What the controller does.
+    pub takeover: Takeover,
     /// Setpoints are followed so much later. \[ns\]
     pub delay_ns: u64,
     /// Following ends so long after the last deadline. \[ns\]
@@ -57,9 +66,9 @@ pub struct Point {
     /// Since the message's stamp. \[ns\]
     pub after_ns: u64,
     /// \[rad\]
-    pub q: Joints,
+    pub q: JointVector,
     /// \[rad/s\]
-    pub v: Joints,
+    pub v: JointVector,
 }
 
 /// What is sent to the controller.
@@ -99,8 +108,8 @@ impl std::fmt::Display for Stop {
 struct Due {
     /// When it is followed. \[ns\]
     at_ns: u64,
-    q: Joints,
-    v: Joints,
+    q: JointVector,
+    v: JointVector,
 }
 
 /// What is being followed.
@@ -110,12 +119,12 @@ struct Following {
     /// Up to where setpoints were sent. \[ns\]
     sent_ns: u64,
     /// The last setpoint.
-    last: (Joints, Joints),
+    last: (JointVector, JointVector),
     /// Whole turns that bring the setpoints to where the arm is. \[rad\]
-    turns: Joints,
+    turns: JointVector,
     /// When following began, and how far the controller's own setpoint was from the first one.
     began_ns: u64,
-    offset: Joints,
+    offset: JointVector,
 }
 
 /// The stream's memory.
@@ -124,10 +133,12 @@ pub struct Stream {
     rules: Rules,
     following: Option<Following>,
     waiting: VecDeque<Due>,
+    /// Those of the messages so far that are still ahead, for [`Takeover::AtArrival`].
+    ahead: VecDeque<Due>,
     /// Sequence and deadline of the last that are followed, and when.
     known: VecDeque<(u64, u64, u64)>,
     /// Where and when the last message comes to rest.
-    rest: Option<(Joints, u64)>,
+    rest: Option<(JointVector, u64)>,
     /// Whether the last message stands still where it ends.
     stands: bool,
     /// Why following ended or does not begin, until it does.
@@ -144,11 +155,13 @@ pub struct Stream {
 
 impl Stream {
     /// Follows nothing yet.
+    #[must_use]
     pub fn new(rules: Rules) -> Self {
         Self {
             rules,
             following: None,
             waiting: VecDeque::new(),
+            ahead: VecDeque::new(),
             known: VecDeque::with_capacity(REMEMBERED),
             rest: None,
             stands: false,
@@ -162,10 +175,12 @@ impl Stream {
     }
 
     /// Takes a setpoint while the arm is measured at `measured`.
-    pub fn take(&mut self, setpoint: &Setpoint, measured: &Joints) {
-        let q: Joints = std::array::from_fn(|j| setpoint.positions[j]);
-        let v: Joints = std::array::from_fn(|j| setpoint.velocities[j]);
-        let sound = setpoint.joint_count as usize == DOF
+    pub fn take(&mut self, setpoint: &Setpoint, measured: &JointVector) {
+        let all = self.rules.joints;
+        let used = |j: usize, value: f64| if j < all { value } else { 0.0 };
+        let q = JointVector::from_fn(|j| used(j, setpoint.positions[j]));
+        let v = JointVector::from_fn(|j| used(j, setpoint.velocities[j]));
+        let sound = setpoint.joint_count as usize == all
             && q.iter().chain(&v).all(|x| x.is_finite())
             && self.last_deadline_ns.is_none_or(|last| setpoint.deadline_ns > last);
         if !sound {
@@ -197,11 +212,12 @@ impl Stream {
 
     /// Begins to follow with this setpoint, if it is where the arm is, which has come to rest.
     /// While the arm follows nothing, the executor's setpoints follow the arm.
-    fn begin(&mut self, setpoint: &Setpoint, q: &Joints, measured: &Joints) {
-        let turns = self.turns_to(q, measured);
-        let q = &std::array::from_fn(|j| q[j] + turns[j]);
+    fn begin(&mut self, setpoint: &Setpoint, q: &JointVector, measured: &JointVector) {
+        let turns = self.rules.continuous.turns_to(q, measured);
+        let q = &(*q + turns);
         // A position that is no number is not near.
-        let far = !(0..DOF).all(|j| (q[j] - measured[j]).abs() <= self.rules.start_tolerance);
+        let near = |j: usize| (q[j] - measured[j]).abs() <= self.rules.start_tolerance;
+        let far = !(0..self.rules.joints).all(near);
         self.refused += u64::from(far);
         if far {
             self.stopped.get_or_insert(Stop::Far);
@@ -215,30 +231,23 @@ impl Stream {
         // The controller goes on from its own setpoint, not from where the arm is.
         let from = self.rest.map_or(*measured, |(rest, _)| rest);
         let at_ns = playout.at_ns();
-        self.waiting.push_back(Due { at_ns, q: from, v: [0.0; DOF] });
+        self.waiting.push_back(Due { at_ns, q: from, v: JointVector::ZERO });
         self.following = Some(Following {
             playout,
             sent_ns: at_ns,
             began_ns: at_ns,
-            last: (*q, [0.0; DOF]),
+            last: (*q, JointVector::ZERO),
             turns,
-            offset: std::array::from_fn(|j| from[j] - q[j]),
+            offset: from - *q,
         });
         self.stopped = None;
         self.stands = false;
     }
 
-    /// Whole turns of the continuous joints that bring `q` nearest to where the arm is. \[rad\]
-    fn turns_to(&self, q: &Joints, measured: &Joints) -> Joints {
-        let wide = |q: &Joints| JointVector::from_fn(|j| q.get(j).copied().unwrap_or(0.0));
-        let turns = self.rules.continuous.turns_to(&wide(q), &wide(measured));
-        std::array::from_fn(|j| turns[j])
-    }
-
-    fn follow(&mut self, sequence: u64, deadline_ns: u64, q: Joints, v: Joints) {
+    fn follow(&mut self, sequence: u64, deadline_ns: u64, q: JointVector, v: JointVector) {
         let Some(f) = &mut self.following else { return };
-        let q: Joints = std::array::from_fn(|j| q[j] + f.turns[j]);
-        let still = v == [0.0; DOF] && f.last == (q, v);
+        let q = q + f.turns;
+        let still = v == JointVector::ZERO && f.last == (q, v);
         f.last = (q, v);
         f.playout.advance(sequence, deadline_ns, still);
         let (at_ns, pace) = (f.playout.at_ns(), f.playout.pace());
@@ -246,8 +255,8 @@ impl Stream {
         let (fade, slope) = (1.0 - u * u * (3.0 - 2.0 * u), -6.0 * u * (1.0 - u) / FADE);
         self.waiting.push_back(Due {
             at_ns,
-            q: std::array::from_fn(|j| q[j] + fade * f.offset[j]),
-            v: std::array::from_fn(|j| v[j] * pace + slope * f.offset[j]),
+            q: JointVector::from_fn(|j| q[j] + fade * f.offset[j]),
+            v: JointVector::from_fn(|j| v[j] * pace + slope * f.offset[j]),
         });
     }
 
@@ -255,6 +264,7 @@ impl Stream {
     /// begins where it is.
     pub fn let_go(&mut self) {
         self.waiting.clear();
+        self.ahead.clear();
         self.following = None;
         self.rest = None;
     }
@@ -262,13 +272,14 @@ impl Stream {
     /// Follows no longer: the arm comes to rest on the last message.
     fn stop(&mut self, why: Stop) {
         self.waiting.clear();
+        self.ahead.clear();
         if self.following.take().is_some() {
             self.stopped = Some(why);
         }
     }
 
     /// Whether setpoints are being followed.
-    #[cfg(test)]
+    #[must_use]
     pub fn follows(&self) -> bool {
         self.following.is_some()
     }
@@ -286,6 +297,7 @@ impl Stream {
     }
 
     /// The newest setpoint that was in force at a moment, with its deadline.
+    #[must_use]
     pub fn in_force(&self, at_ns: u64) -> Option<(u64, u64)> {
         let (sequence, deadline, _) = self.known.iter().rev().find(|(_, _, at)| *at <= at_ns)?;
         Some((*sequence, *deadline))
@@ -301,7 +313,7 @@ impl Stream {
         } else {
             f.sent_ns
         };
-        let start_ns = from.saturating_sub(EARLY_NS);
+        let mut start_ns = from.saturating_sub(EARLY_NS);
         if start_ns <= now_ns + TRANSIT_NS {
             // Too late to splice: the arm is already slowing down on the last message. A stamp in
             // the past would make it jump.
@@ -310,24 +322,38 @@ impl Stream {
             return None;
         }
         f.sent_ns = last.at_ns;
-        let stands = last.v == [0.0; DOF] && self.waiting.iter().all(|due| due.q == last.q);
+        let stands = last.v == JointVector::ZERO && self.waiting.iter().all(|due| due.q == last.q);
         if stands && self.stands && self.rest.is_some_and(|(rest, _)| rest == last.q) {
             self.waiting.clear();
+            // The next message goes on from there.
+            self.ahead.clear();
+            self.ahead.push_back(last);
             return None;
         }
-        let mut points = Vec::with_capacity(self.waiting.len() / 4 + 2);
+        let mut sent = Vec::with_capacity(self.waiting.len() / 4 + 2);
         let mut before = from;
         for due in self.waiting.drain(..) {
             if due.at_ns >= before + SPACING_NS || due.at_ns == last.at_ns {
-                points.push(Point { after_ns: due.at_ns - start_ns, q: due.q, v: due.v });
+                sent.push(due);
                 before = due.at_ns;
             }
         }
+        if self.rules.takeover == Takeover::AtArrival {
+            // Its first point lies on the way that the controller is on: wherever it is there when
+            // the message comes, it goes on as it did.
+            let soon = now_ns + TRANSIT_NS;
+            self.ahead.retain(|due| due.at_ns > soon);
+            start_ns = self.ahead.front().map_or(start_ns, |first| first.at_ns - EARLY_NS);
+            self.ahead.extend(sent);
+            sent = self.ahead.iter().copied().collect();
+        }
+        let after = |due: Due| Point { after_ns: due.at_ns - start_ns, q: due.q, v: due.v };
+        let mut points: Vec<Point> = sent.into_iter().map(after).collect();
         let fastest = last.v.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let stop = (fastest / self.rules.stop_acceleration).max(SHORTEST_STOP);
-        let rest: Joints = std::array::from_fn(|j| last.q[j] + 0.5 * stop * last.v[j]);
+        let rest = JointVector::from_fn(|j| last.q[j] + 0.5 * stop * last.v[j]);
         let rest_ns = last.at_ns + (stop * 1e9) as u64;
-        points.push(Point { after_ns: rest_ns - start_ns, q: rest, v: [0.0; DOF] });
+        points.push(Point { after_ns: rest_ns - start_ns, q: rest, v: JointVector::ZERO });
         self.rest = Some((rest, rest_ns));
         self.stands = fastest == 0.0;
         self.made += 1;

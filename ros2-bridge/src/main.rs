@@ -1,0 +1,61 @@
+//! `ros2-bridge`: the hardware endpoint of Nullsweep for arms that speak ROS 2. Setpoints of the
+//! executor become short trajectories for a ros2_control controller, its joint states become the
+//! executor's states. And the other way round: a controller for ROS programs, with the executor
+//! behind it.
+
+mod args;
+mod domain;
+mod door;
+mod endpoint;
+mod goals;
+mod link;
+mod messages;
+mod serve;
+mod trajectory;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use nullsweep_executor::log::{Log, last_words};
+
+use args::{Common, RunArgs, ServeArgs};
+
+/// Stands between the executor and an arm that speaks ROS 2.
+#[derive(Debug, Parser)]
+#[command(
+    name = "ros2-bridge",
+    version,
+    after_help = "Exit codes: 0 ended by SIGINT or SIGTERM; 1 failed; 2 wrong usage."
+)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Be the endpoint until ended
+    Run(Box<RunArgs>),
+    /// Be a controller for ROS programs, with the executor behind it, until ended
+    Serve(Box<ServeArgs>),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    // The executor's: no setpoint waits for whoever reads it.
+    let log = Log::install("ros2_bridge=info,nullsweep_bridge=info,warn");
+    let result = match &cli.command {
+        Command::Run(args) => endpoint::run(&cli.common, args),
+        Command::Serve(args) => serve::run(&cli.common, args),
+    };
+    log.end();
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            last_words(&format!("ros2-bridge: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}

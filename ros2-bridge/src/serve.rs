@@ -1,0 +1,434 @@
+//! The other way round: a controller for ROS programs with the executor behind it. Goals of a
+//! FollowJointTrajectory action, and trajectories on a topic, become plans; what becomes of the plans
+//! are the goals' ends.
+//!
+//! A goal that comes while another one runs takes its place: the arm is stopped on its path, and goes
+//! from there to the first point whose time is not past, as fast as its joints may.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use nullsweep_bridge::{Waypoint, front, moment};
+use nullsweep_executor::Guard;
+use nullsweep_ipc_types::ports::{Asked, CommandClient, Ipc, PlanPublisher, Receiver, now_ns};
+use nullsweep_ipc_types::{
+    CommandKind, EventKind, Interpolation, JoinRule, Mode, PlanEvent, PlanHeader, PlanId, Reason,
+    Telemetry, Verdict,
+};
+use nullsweep_robot::{Arm, JointVector};
+use ros2_client::action::GoalId;
+use ros2_client::service::RmwRequestId;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use crate::args::{Common, ServeArgs};
+use crate::door::{Door, Wanted};
+use crate::goals::{Goals, Status};
+use crate::messages::{FollowResult, JointTrajectory};
+
+/// Time between two looks.
+const ROUND: Duration = Duration::from_millis(1);
+/// An executor that has not said a word for so long is gone. \[ns\]
+const SILENT_NS: u64 = 500_000_000;
+/// How long a stop, an admission or a command's answer is waited for.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// What is to be followed next.
+struct Wish {
+    /// `None`: it came on the topic, and nobody waits for its end.
+    goal: Option<(RmwRequestId, GoalId)>,
+    points: Vec<Waypoint>,
+    /// When it is to begin. \[ns\]
+    begins_ns: u64,
+    since: Instant,
+}
+
+/// What the executor has.
+struct Running {
+    plan: PlanId,
+    goal: Option<GoalId>,
+    /// Who is to be told whether it was accepted.
+    asker: Option<RmwRequestId>,
+    since: Instant,
+    accepted: bool,
+}
+
+/// Runs until SIGINT or SIGTERM.
+pub fn run(common: &Common, args: &ServeArgs) -> anyhow::Result<()> {
+    let done = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&done))?;
+    }
+    let arm = args.load()?;
+    let rename = args.arm.names(&arm)?;
+    let names: Vec<String> = arm.joint_names().iter().map(|name| rename(name)).collect();
+    let mut door = Door::open(common, &args.controller, args.publish_joint_states, names)?;
+    let mut server = Server::open(args, &arm)?;
+    tracing::info!("robot {}: goals on {}", args.robot_name, door.action());
+    while !done.load(Ordering::Relaxed) {
+        std::thread::sleep(ROUND);
+        server.round(&mut door)?;
+    }
+    server.close(&mut door);
+    Ok(())
+}
+
+struct Server {
+    plans: PlanPublisher,
+    events: Receiver<PlanEvent>,
+    telemetry: Receiver<Telemetry>,
+    commands: CommandClient,
+    header: PlanHeader,
+    guard: Guard,
+    goals: Goals<GoalId, RmwRequestId>,
+    wish: Option<Wish>,
+    running: Option<Running>,
+    newest: Option<Telemetry>,
+    /// When the running plan was last asked to stop, and the question.
+    stopping: Option<(Instant, Asked)>,
+}
+
+impl Server {
+    fn open(args: &ServeArgs, arm: &Arm) -> anyhow::Result<Self> {
+        let ipc = Ipc::open(&args.robot_name, args.ipc_root.as_deref())?;
+        let mut header = PlanHeader {
+            fingerprint: arm.fingerprint(),
+            joint_count: arm.dof() as u32,
+            held_count: arm.held_joints().len() as u32,
+            join_rule: JoinRule::StopThenStart.wire(),
+            ..PlanHeader::default()
+        };
+        header.base_pose[6] = 1.0;
+        for (slot, held) in header.held_positions.iter_mut().zip(arm.held_joints()) {
+            *slot = held.position;
+        }
+        Ok(Self {
+            plans: ipc.plan_publisher(nullsweep_ipc_types::MAX_KNOTS)?,
+            events: ipc.event_receiver()?,
+            telemetry: ipc.telemetry_receiver()?,
+            commands: ipc.command_client().context("the executor takes no more clients")?,
+            header,
+            guard: Guard::new(arm.limits()),
+            goals: Goals::default(),
+            wish: None,
+            running: None,
+            newest: None,
+            stopping: None,
+        })
+    }
+
+    fn round(&mut self, door: &mut Door) -> anyhow::Result<()> {
+        while let Some(telemetry) = self.telemetry.receive()? {
+            door.show(&telemetry);
+            self.newest = Some(telemetry);
+        }
+        while let Some(event) = self.events.receive()? {
+            self.event(&event, door);
+        }
+        let answer = self.stopping.as_ref().and_then(|(_, asked)| asked.answer().ok().flatten());
+        if answer.is_some_and(|answer| answer.verdict == Verdict::Busy.wire()) {
+            self.stopping = None;
+            self.stop();
+        }
+        for wanted in door.wanted() {
+            match wanted {
+                Wanted::Goal { asker, id, trajectory } => {
+                    if self.goals.knows(id) {
+                        door.answer_goal(asker, false);
+                    } else {
+                        self.wish(Some((asker, id)), &trajectory, door);
+                    }
+                }
+                Wanted::Trajectory(trajectory) => self.wish(None, &trajectory, door),
+                Wanted::Cancel { asker, id } => self.cancel(asker, id, door),
+                Wanted::Result { asker, id } => match self.goals.ask(id, asker) {
+                    Ok(Some((asker, goal))) => {
+                        door.answer_result(asker, Some(goal.status), &goal.result)
+                    }
+                    Ok(None) => {}
+                    Err(asker) => door.answer_result(asker, None, &FollowResult::default()),
+                },
+            }
+        }
+        self.lose(door);
+        self.begin(door);
+        door.tell(&self.goals, self.running.as_ref().and_then(|r| r.goal), self.newest.as_ref());
+        Ok(())
+    }
+
+    /// What the executor did with a plan.
+    fn event(&mut self, event: &PlanEvent, door: &mut Door) {
+        let Some(running) = self.running.as_mut().filter(|r| r.plan == event.plan) else { return };
+        let Some(kind) = EventKind::from_wire(event.kind) else { return };
+        let reason = Reason::from_wire(event.reason).unwrap_or(Reason::None);
+        match kind {
+            EventKind::Accepted => {
+                running.accepted = true;
+                if let (Some(id), Some(asker)) = (running.goal, running.asker.take()) {
+                    self.goals.accept(id, Instant::now());
+                    door.answer_goal(asker, true);
+                }
+            }
+            EventKind::Started => {}
+            EventKind::Rejected => {
+                let place = |n: u32| if n == u32::MAX { "-".into() } else { n.to_string() };
+                tracing::warn!(
+                    "a goal was refused by the executor: {reason}, knot {}, joint {}: {} against {}",
+                    place(event.knot),
+                    place(event.joint),
+                    event.value,
+                    event.bound
+                );
+                if let Some(asker) = running.asker.take() {
+                    door.answer_goal(asker, false);
+                }
+                self.running = None;
+            }
+            EventKind::Finished => self.end(Status::Succeeded, FollowResult::SUCCESSFUL, "", door),
+            EventKind::Superseded | EventKind::Aborted => {
+                let code = match reason {
+                    Reason::Goal => FollowResult::GOAL_TOLERANCE_VIOLATED,
+                    Reason::Fault => FollowResult::PATH_TOLERANCE_VIOLATED,
+                    _ => FollowResult::INVALID_GOAL,
+                };
+                self.end(Status::Aborted, code, reason.text(), door);
+            }
+        }
+    }
+
+    /// The running plan has ended.
+    fn end(&mut self, status: Status, code: i32, why: &str, door: &mut Door) {
+        let Some(running) = self.running.take() else { return };
+        self.stopping = None;
+        let Some(id) = running.goal else { return };
+        if let Some(asker) = running.asker {
+            door.answer_goal(asker, false);
+            return;
+        }
+        let result = FollowResult { error_code: code, error_string: why.into() };
+        let askers = self.goals.end(id, status, result, Instant::now());
+        if let Some(goal) = self.goals.get(id) {
+            for asker in askers {
+                door.answer_result(asker, Some(goal.status), &goal.result);
+            }
+        }
+    }
+
+    /// Something is to be followed, in place of what is and of what was to be.
+    fn wish(
+        &mut self,
+        goal: Option<(RmwRequestId, GoalId)>,
+        trajectory: &JointTrajectory,
+        door: &mut Door,
+    ) {
+        let refuse = |why: &str, door: &mut Door| {
+            tracing::warn!("a goal is refused: {why}");
+            if let Some((asker, _)) = goal {
+                door.answer_goal(asker, false);
+            }
+        };
+        let Some(points) = waypoints(trajectory, door.names()) else {
+            return refuse("it has other joints than the arm, or points of another size", door);
+        };
+        let Some(now) = self.fresh() else {
+            return refuse("no executor is there, or it is silent", door);
+        };
+        let theirs = now.plan.is_some() && self.running.as_ref().is_none_or(|r| r.plan != now.plan);
+        if theirs && self.running.is_none() {
+            return refuse("the executor has a plan of somebody else's", door);
+        }
+        if let Some((asker, _)) = self.wish.take().and_then(|old| old.goal) {
+            door.answer_goal(asker, false);
+        }
+        let stamp = trajectory.header.stamp;
+        let stamp_ns = if stamp.sec == 0 && stamp.nanosec == 0 {
+            now_ns()
+        } else {
+            moment(stamp.sec, stamp.nanosec)
+        };
+        self.wish = Some(Wish { goal, points, begins_ns: stamp_ns, since: Instant::now() });
+        self.stop();
+    }
+
+    /// Has the arm stop on the path of what runs.
+    fn stop(&mut self) {
+        if self.running.as_ref().is_some_and(|r| r.accepted) && self.stopping.is_none() {
+            match self.commands.ask(CommandKind::Stop, 0.0) {
+                Ok(asked) => self.stopping = Some((Instant::now(), asked)),
+                Err(error) => tracing::error!("the executor cannot be asked to stop: {error}"),
+            }
+        }
+    }
+
+    fn cancel(&mut self, asker: RmwRequestId, id: Option<GoalId>, door: &mut Door) {
+        let meant: Vec<GoalId> = id.map_or_else(|| self.goals.open().collect(), |id| vec![id]);
+        let mut canceling = Vec::new();
+        let mut ended = false;
+        for id in meant {
+            match self.goals.cancel(id) {
+                Some(status) if status.is_end() => ended = true,
+                Some(_) => canceling.push(id),
+                None => {}
+            }
+        }
+        door.answer_cancel(asker, &canceling, ended);
+        if self.running.as_ref().is_some_and(|r| r.goal.is_some_and(|g| canceling.contains(&g))) {
+            self.stop();
+        }
+    }
+
+    /// What cannot come any more.
+    fn lose(&mut self, door: &mut Door) {
+        if self.fresh().is_none() && self.running.is_some() {
+            tracing::error!("the executor is silent: its goal ends");
+            self.end(Status::Aborted, FollowResult::INVALID_GOAL, "the executor was lost", door);
+        }
+        let unheard = |r: &Running| !r.accepted && r.since.elapsed() > PATIENCE;
+        if self.running.as_ref().is_some_and(unheard) {
+            self.end(
+                Status::Aborted,
+                FollowResult::INVALID_GOAL,
+                "the executor says nothing",
+                door,
+            );
+        }
+        // A stop that was lost is asked for again.
+        if self.stopping.as_ref().is_some_and(|(at, _)| at.elapsed() > PATIENCE) {
+            self.stopping = None;
+            self.stop();
+        }
+        if let Some(wish) = self.wish.take_if(|w| w.since.elapsed() > 2 * PATIENCE) {
+            tracing::warn!("a goal is refused: the arm did not come to hold");
+            if let Some((asker, _)) = wish.goal {
+                door.answer_goal(asker, false);
+            }
+        }
+    }
+
+    /// Publishes what is to be followed, once the arm holds.
+    fn begin(&mut self, door: &mut Door) {
+        let Some(now) = self.fresh().copied() else { return };
+        if self.running.is_some() || now.plan.is_some() || now.mode != Mode::Hold.wire() {
+            if self.running.is_none() && now.mode == Mode::Fault.wire() {
+                self.refuse_wish("the executor is in a fault", door);
+            }
+            return;
+        }
+        // A plan is there before telemetry tells it: what is older says nothing.
+        let Some(wish) = self.wish.take() else { return };
+        let holds =
+            JointVector::from_fn(|j| if j < self.guard.dof { now.commanded[j] } else { 0.0 });
+        let passed_ns = now_ns().saturating_sub(wish.begins_ns);
+        // What is new begins at its own time 0, as it came while nothing ran.
+        let at_once = wish.since.elapsed() < Duration::from_millis(20) && passed_ns < 20_000_000;
+        let passed_ns = if at_once { 0 } else { passed_ns };
+        let made = front(&wish.points, passed_ns, &holds, &self.guard);
+        let made = match made {
+            Ok(made) => made,
+            Err(why) => {
+                self.wish = Some(wish);
+                return self.refuse_wish(&why.to_string(), door);
+            }
+        };
+        let header = PlanHeader {
+            interpolation: made.interpolation.wire(),
+            // Straight segments are what was asked for, corners and all.
+            corners: u32::from(made.interpolation == Interpolation::Linear),
+            ..self.header
+        };
+        match self.plans.publish(&header, &made.knots) {
+            Ok(plan) => {
+                let (asker, goal) = wish.goal.unzip();
+                let since = Instant::now();
+                self.running = Some(Running { plan, goal, asker, since, accepted: false });
+            }
+            Err(why) => {
+                self.wish = Some(wish);
+                self.refuse_wish(&why.to_string(), door);
+            }
+        }
+    }
+
+    fn refuse_wish(&mut self, why: &str, door: &mut Door) {
+        let Some(wish) = self.wish.take() else { return };
+        tracing::warn!("a goal is refused: {why}");
+        if let Some((asker, _)) = wish.goal {
+            door.answer_goal(asker, false);
+        }
+    }
+
+    /// The newest telemetry, of an executor that is there.
+    fn fresh(&self) -> Option<&Telemetry> {
+        self.newest.as_ref().filter(|t| now_ns().saturating_sub(t.stamp_ns) < SILENT_NS)
+    }
+
+    /// Ends what runs: nobody would hear of it.
+    fn close(&mut self, door: &mut Door) {
+        self.refuse_wish("ros2-bridge ends", door);
+        self.stop();
+        self.end(Status::Aborted, FollowResult::INVALID_GOAL, "ros2-bridge ended", door);
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// A trajectory's points in the arm's order; `None` for one of other joints.
+fn waypoints(trajectory: &JointTrajectory, names: &[String]) -> Option<Vec<Waypoint>> {
+    let count = trajectory.joint_names.len();
+    if count != names.len() {
+        return None;
+    }
+    let place = |name: &String| trajectory.joint_names.iter().position(|n| n == name);
+    let order: Vec<usize> = names.iter().map(place).collect::<Option<_>>()?;
+    let read =
+        |values: &[f64]| JointVector::from_fn(|j| order.get(j).map_or(0.0, |&from| values[from]));
+    let points = trajectory.points.iter().map(|p| {
+        let sized = p.positions.len() == count
+            && (p.velocities.is_empty() || p.velocities.len() == count)
+            && p.time_from_start.sec >= 0;
+        sized.then(|| Waypoint {
+            after_ns: p.time_from_start.sec as u64 * 1_000_000_000
+                + u64::from(p.time_from_start.nanosec),
+            q: read(&p.positions),
+            v: (!p.velocities.is_empty()).then(|| read(&p.velocities)),
+        })
+    });
+    points.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::{Duration, JointTrajectoryPoint};
+
+    #[test]
+    fn joints_come_in_any_order_and_all_of_them() {
+        let names = ["a", "b", "c"].map(String::from);
+        let point = |positions: &[f64], velocities: &[f64]| JointTrajectoryPoint {
+            positions: positions.to_vec(),
+            velocities: velocities.to_vec(),
+            time_from_start: Duration { sec: 1, nanosec: 5 },
+            ..JointTrajectoryPoint::default()
+        };
+        let trajectory = |joints: &[&str], points: Vec<JointTrajectoryPoint>| JointTrajectory {
+            joint_names: joints.iter().map(|j| j.to_string()).collect(),
+            points,
+            ..JointTrajectory::default()
+        };
+        let turned = trajectory(&["c", "a", "b"], vec![point(&[3.0, 1.0, 2.0], &[0.3, 0.1, 0.2])]);
+        let found = waypoints(&turned, &names).expect("points");
+        assert_eq!(
+            (found[0].q[..3].to_vec(), found[0].after_ns),
+            (vec![1.0, 2.0, 3.0], 1_000_000_005)
+        );
+        assert_eq!(found[0].v.expect("some")[..3], [0.1, 0.2, 0.3]);
+        for other in [
+            trajectory(&["a", "b"], vec![point(&[1.0, 2.0], &[])]),
+            trajectory(&["a", "b", "d"], vec![point(&[1.0, 2.0, 3.0], &[])]),
+            trajectory(&["a", "b", "c"], vec![point(&[1.0, 2.0], &[])]),
+            trajectory(&["a", "b", "c"], vec![point(&[1.0, 2.0, 3.0], &[1.0])]),
+        ] {
+            assert!(waypoints(&other, &names).is_none(), "{other:?}");
+        }
+    }
+}

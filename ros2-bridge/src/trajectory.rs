@@ -1,0 +1,70 @@
+//! Messages to the arm's controller.
+
+use nullsweep_bridge::{Message, Point, wall_time};
+use nullsweep_robot::JointVector;
+
+use crate::messages::{
+    Duration, Float64MultiArray, Header, JointTrajectory, JointTrajectoryPoint, Time,
+};
+
+/// ROS time of a moment on `CLOCK_MONOTONIC`.
+pub fn ros_time(at_ns: u64) -> Time {
+    let (sec, nanosec) = wall_time(at_ns);
+    Time { sec, nanosec }
+}
+
+/// A message as a joint_trajectory_controller takes it. Its number goes as the frame, which no
+/// controller reads: whoever records them sees one that was lost.
+pub fn trajectory(message: &Message, names: &[String]) -> JointTrajectory {
+    JointTrajectory {
+        header: Header {
+            stamp: ros_time(message.start_ns),
+            frame_id: format!("nullsweep {}", message.sequence),
+        },
+        joint_names: names.to_vec(),
+        points: message.points.iter().map(|p| point(p, names.len())).collect(),
+    }
+}
+
+/// Positions as a forward_position_controller takes them.
+pub fn positions(q: &JointVector, joints: usize) -> Float64MultiArray {
+    Float64MultiArray { data: q[..joints].to_vec(), ..Float64MultiArray::default() }
+}
+
+fn point(point: &Point, joints: usize) -> JointTrajectoryPoint {
+    JointTrajectoryPoint {
+        positions: point.q[..joints].to_vec(),
+        velocities: point.v[..joints].to_vec(),
+        time_from_start: Duration::from_ns(point.after_ns),
+        ..JointTrajectoryPoint::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_has_its_joints_times_and_number() {
+        let joint = |x: f64| JointVector::from_fn(|j| if j < 6 { x + j as f64 } else { 0.0 });
+        let start_ns = nullsweep_ipc_types::ports::now_ns() + 50_000_000;
+        let message = Message {
+            sequence: 7,
+            start_ns,
+            points: vec![
+                Point { after_ns: 10_000, q: joint(0.1), v: joint(0.5) },
+                Point { after_ns: 1_250_000_000, q: joint(0.2), v: JointVector::ZERO },
+            ],
+        };
+        let names: Vec<String> = (0..6).map(|j| format!("joint_{j}")).collect();
+        let sent = trajectory(&message, &names);
+        assert_eq!((sent.joint_names, sent.header.frame_id.as_str()), (names, "nullsweep 7"));
+        let stamp = nullsweep_bridge::moment(sent.header.stamp.sec, sent.header.stamp.nanosec);
+        assert!(stamp.abs_diff(start_ns) < 1_000_000, "{stamp} for {start_ns}");
+        assert_eq!(sent.points[0].positions, [0.1, 1.1, 2.1, 3.1, 4.1, 5.1]);
+        assert_eq!(sent.points[0].time_from_start, Duration { sec: 0, nanosec: 10_000 });
+        assert_eq!(sent.points[1].time_from_start, Duration { sec: 1, nanosec: 250_000_000 });
+        assert_eq!(sent.points[1].velocities, [0.0; 6]);
+        assert_eq!(positions(&joint(0.1), 6).data, sent.points[0].positions);
+    }
+}
