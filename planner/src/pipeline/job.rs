@@ -4,6 +4,7 @@ use nullsweep_collision::Options;
 use nullsweep_robot::{ArmSpec, JointVector, Tool};
 use nullsweep_surface::PatchConfig;
 
+use super::end::End;
 use crate::plan::{Continues, CostKind, Method, Plan, PlanError, Profile};
 use crate::roadmap::GraphConfig;
 use crate::tour::formulation::FormulationConfig;
@@ -21,6 +22,8 @@ pub struct Job {
     /// Where the arm is; `None`: a posture that the SRDF names (home before others), else the middle
     /// of its ranges, or where it collides there the nearest free posture found. \[rad\] or \[m\]
     pub start: Option<JointVector>,
+    /// Where the arm is left.
+    pub end: End,
     /// A plan that this one goes on from.
     pub after: Option<After>,
     /// How the order is found.
@@ -58,6 +61,7 @@ impl Job {
             tool: Tool::default(),
             stance: StanceChoice::Auto,
             start: None,
+            end: End::default(),
             after: None,
             method: Method::Curvature,
             cost: CostKind::Time,

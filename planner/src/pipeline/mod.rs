@@ -4,6 +4,7 @@ mod assemble;
 mod attempt;
 mod clock;
 mod completion;
+mod end;
 mod error;
 mod figures;
 mod job;
@@ -14,6 +15,7 @@ mod setting;
 mod start;
 mod swept;
 
+pub use end::End;
 pub use error::PipelineError;
 pub use figures::Figures;
 pub use job::{After, Job, StanceChoice};
