@@ -144,11 +144,21 @@ where
     };
     match result {
         Ok(code) => code,
+        // Whoever reads the output has read enough.
+        Err(e) if e.chain().any(is_broken_pipe) => ExitCode::from(BROKEN_PIPE),
         Err(e) => {
             last_words(&format!("executor: {}", nullsweep_cell::causes(e.as_ref())));
             ExitCode::from(if e.is::<Usage>() { 2 } else { 1 })
         }
     }
+}
+
+/// The exit code where nobody reads what is written any more: as a shell tells a signal.
+const BROKEN_PIPE: u8 = 128 + 13;
+
+fn is_broken_pipe(cause: &(dyn std::error::Error + 'static)) -> bool {
+    let error = cause.downcast_ref::<std::io::Error>();
+    error.is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
 }
 
 fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {

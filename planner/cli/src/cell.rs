@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
 use nullsweep_collision::{ToolContact, World};
+use nullsweep_ipc_types::service::DEFAULT_ROBOT;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::{Scene, nearest_free};
 use nullsweep_robot::{Arm, ArmSpec, JointKind, JointVector, MAX_DOF, Robot, Tool};
@@ -13,7 +14,7 @@ use nullsweep_robot::{Arm, ArmSpec, JointKind, JointVector, MAX_DOF, Robot, Tool
 use crate::bars::Bars;
 use crate::exit::{FAILED, OK, Usage};
 use crate::numbers::Held;
-use crate::posture::PostureArg;
+use crate::posture_arg::PostureArg;
 use crate::robot::{RobotArgs, tool_file};
 use crate::site::SiteArgs;
 
@@ -79,7 +80,7 @@ fn init(args: &InitArgs) -> anyhow::Result<u8> {
     let spec = spec_for(&robot, &args.check.robot)?;
     let arm = args.check.arm(&robot, &spec)?;
     let found = args.check.look(&robot, &arm)?;
-    let text = args.check.file(&arm, found.home, out.parent().unwrap_or(Path::new("")))?;
+    let text = args.check.file(&robot, &arm, found.home, out.parent().unwrap_or(Path::new("")))?;
     std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
     print!("{}", found.text);
     println!("cell: {}", out.display());
@@ -201,8 +202,24 @@ impl CheckArgs {
         Ok(Found { text, home: free, sound })
     }
 
+    /// The robot's name in its services' names: as it was given, else by its URDF.
+    fn name(&self, robot: &Robot) -> String {
+        let given = self.site.site().robot;
+        if given != DEFAULT_ROBOT {
+            return given.to_owned();
+        }
+        let sound = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+        robot.name().chars().map(|c| if sound(c) { c } else { '_' }).collect()
+    }
+
     /// The cell file, its paths from `folder` on.
-    fn file(&self, arm: &Arm, home: JointVector, folder: &Path) -> anyhow::Result<String> {
+    fn file(
+        &self,
+        robot: &Robot,
+        arm: &Arm,
+        home: JointVector,
+        folder: &Path,
+    ) -> anyhow::Result<String> {
         let path = |path: &Path| -> anyhow::Result<String> {
             let at = path.canonicalize().with_context(|| path.display().to_string())?;
             let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -221,7 +238,7 @@ impl CheckArgs {
             let _ = writeln!(text, "# {about}\n{line}");
         };
         let quoted = |text: &str| format!("{text:?}");
-        let name = quoted(self.site.site().robot);
+        let name = quoted(&self.name(robot));
         put("Name of the robot in the names of its services.", "robot", Some(name), "");
         let urdf = files.urdf.map(path).transpose()?;
         put("The robot; without it a PR2.", "urdf", urdf, "\"robot.urdf\"");
@@ -250,8 +267,8 @@ impl CheckArgs {
         let names = arm.joint_names().join(", ");
         let _ = writeln!(
             text,
-            "\n# Joint vectors by name: {names}.\n# `start` is where plans begin, `planner goto home` \
-             goes home.\n[postures]\nhome = [{}]\n# start = [{}]",
+            "\n# Joint vectors by name: {names}.\n# Plans begin at `start`, or at `home` where there is \
+             none.\n[postures]\nhome = [{}]\n# start = [{}]",
             list(arm, &home, 4),
             list(arm, &home, 4)
         );

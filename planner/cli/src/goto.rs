@@ -13,7 +13,7 @@ use crate::bars::Bars;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::numbers::{Held, Numbers};
 use crate::output::writable;
-use crate::posture::PostureArg;
+use crate::posture_arg::PostureArg;
 use crate::robot::{RobotArgs, tool_file};
 use crate::send::{SendArgs, outlook, resting};
 use crate::site::SiteArgs;
@@ -22,9 +22,11 @@ use crate::way::{Broken, Way, WayArgs};
 #[derive(Debug, Args)]
 pub(super) struct GotoArgs {
     /// Where to: a posture by its name (home, start, …) or its joints, Q1,Q2,…; left out where --plan
-    /// says it. Then the scans of what is around the arm, if any.
-    #[arg(value_name = "POSTURE] [SCAN", allow_hyphen_values = true)]
-    words: Vec<String>,
+    /// says it.
+    #[arg(value_name = "POSTURE", allow_hyphen_values = true)]
+    target: Option<String>,
+    /// The scans of what is around the arm, as they were given to `plan`.
+    scans: Vec<PathBuf>,
     /// To this plan's first knot, or, with a posture, standing as that plan has it.
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
@@ -59,7 +61,7 @@ pub(super) fn run(args: &GotoArgs) -> anyhow::Result<u8> {
     }
     let bars = Bars::new();
     let plan = args.plan.as_deref().map(Plan::read).transpose()?;
-    let (target, scans) = args.words(plan.is_some())?;
+    let (target, scans) = args.asked(plan.is_some())?;
     let way = match &plan {
         Some(plan) => Way::of(plan, &args.robot, args.site.site(), &scans),
         None => args.standing(&scans)?,
@@ -100,18 +102,15 @@ fn first(plan: &Plan) -> anyhow::Result<JointVector> {
 }
 
 impl GotoArgs {
-    /// What the words mean: the posture and the scans. With a plan the posture may be left out.
-    fn words(&self, planned: bool) -> anyhow::Result<(Option<PostureArg>, Vec<PathBuf>)> {
-        let scans = |words: &[String]| words.iter().map(PathBuf::from).collect();
-        let Some((first, rest)) = self.words.split_first() else {
-            return Ok((None, Vec::new()));
-        };
-        let posture = first.parse::<PostureArg>();
+    /// The posture that is asked for, and the scans. With a plan the posture may be left out.
+    fn asked(&self, planned: bool) -> anyhow::Result<(Option<PostureArg>, Vec<PathBuf>)> {
+        let Some(first) = &self.target else { return Ok((None, Vec::new())) };
         if planned && Path::new(first).exists() {
-            return Ok((None, scans(&self.words)));
+            let first = PathBuf::from(first);
+            return Ok((None, std::iter::once(first).chain(self.scans.iter().cloned()).collect()));
         }
-        match posture {
-            Ok(posture) => Ok((Some(posture), scans(rest))),
+        match first.parse::<PostureArg>() {
+            Ok(posture) => Ok((Some(posture), self.scans.clone())),
             Err(why) => {
                 Err(Usage(format!("`{first}` is neither a posture nor a file: {why}")).into())
             }

@@ -17,6 +17,7 @@ mod picture;
 mod placed;
 mod plan;
 mod posture;
+mod posture_arg;
 mod publish;
 mod refusal;
 mod replan;

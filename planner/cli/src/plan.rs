@@ -25,7 +25,7 @@ use crate::json::write_json;
 use crate::numbers::{Held, Numbers, finite, not_negative, percent, place, positive, velocity};
 use crate::output::writable;
 use crate::picture::picture;
-use crate::posture::PostureArg;
+use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};

@@ -8,7 +8,7 @@ use clap::Args;
 use nullsweep_collision::{MeshPaths, Options};
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
 
-use crate::posture::NamedPosture;
+use crate::posture_arg::NamedPosture;
 
 #[derive(Debug, Args)]
 pub(super) struct RobotArgs {

@@ -8,6 +8,8 @@ use clap::CommandFactory;
 use clap_complete::Shell;
 use nullsweep_cell::{DESCRIBE, Described, VARIABLE};
 
+use crate::arguments::Cli;
+use crate::out::write_out;
 use crate::programs::{EXECUTOR, PLANNER, WHOLE, path};
 
 /// Writes what a shell completes by to standard output.
@@ -17,7 +19,7 @@ use crate::programs::{EXECUTOR, PLANNER, WHOLE, path};
 pub(crate) fn completions(shell: Shell) -> anyhow::Result<ExitCode> {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut whole()?, "nullsweep", &mut text);
-    crate::write_out(&text)
+    write_out(&text)
 }
 
 /// Writes manual pages to a folder.
@@ -33,7 +35,7 @@ pub(crate) fn manuals(folder: &Path) -> anyhow::Result<ExitCode> {
 
 /// This program with all that the others take.
 fn whole() -> anyhow::Result<clap::Command> {
-    let mut command = crate::Cli::command();
+    let mut command = Cli::command();
     for program in [PLANNER, EXECUTOR] {
         for below in ask(program)?.below() {
             let name = below.name().to_owned();

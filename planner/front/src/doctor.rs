@@ -7,8 +7,8 @@ use std::process::{Command, ExitCode, Stdio};
 
 use rustix::process::{Resource, getrlimit};
 
+use crate::out::write_out;
 use crate::programs::{EXECUTOR, PLANNER, WHOLE, path};
-use crate::write_out;
 
 /// What was looked at.
 #[derive(Debug, PartialEq)]

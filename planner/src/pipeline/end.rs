@@ -1,25 +1,12 @@
-//! Where a plan leaves the arm.
+//! The way from a plan's last stop to where it leaves the arm.
 
 use nullsweep_robot::JointVector;
 
 use super::attempt::Planning;
+use super::job::End;
 use crate::motion::{jump, retract};
 use crate::plan::{LIFT, Plan, PlanKnot};
 use crate::timing;
-
-/// Where a plan leaves the arm.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum End {
-    /// With the tool lifted off the surface, so that the next plan, or the way home, starts free.
-    #[default]
-    Lifted,
-    /// Where the plan began, so that it can run again.
-    Start,
-    /// In this posture. \[rad\] or \[m\]
-    At(JointVector),
-    /// On the surface, at the last stop.
-    Contact,
-}
 
 impl Planning<'_> {
     /// Puts the way from the last stop to where the plan is to end behind a plan with bang-bang

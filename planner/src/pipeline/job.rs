@@ -4,7 +4,6 @@ use nullsweep_collision::Options;
 use nullsweep_robot::{ArmSpec, JointVector, Tool};
 use nullsweep_surface::PatchConfig;
 
-use super::end::End;
 use crate::plan::{Continues, CostKind, Method, Plan, PlanError, Profile};
 use crate::roadmap::GraphConfig;
 use crate::tour::formulation::FormulationConfig;
@@ -87,6 +86,20 @@ pub enum StanceChoice {
     Given(Stance),
     /// Where it reaches most of what is searched.
     Search(StanceSearch),
+}
+
+/// Where a plan leaves the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum End {
+    /// With the tool lifted off the surface, so that the next plan, or the way home, starts free.
+    #[default]
+    Lifted,
+    /// Where the plan began, so that it can run again.
+    Start,
+    /// In this posture. \[rad\] or \[m\]
+    At(JointVector),
+    /// On the surface, at the last stop.
+    Contact,
 }
 
 /// The plan and the knot that a new plan goes on from.

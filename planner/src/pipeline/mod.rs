@@ -15,9 +15,8 @@ mod setting;
 mod start;
 mod swept;
 
-pub use end::End;
 pub use error::PipelineError;
 pub use figures::Figures;
-pub use job::{After, Job, StanceChoice};
+pub use job::{After, End, Job, StanceChoice};
 pub use left_out::LeftOut;
 pub use run::{Outcome, run};

@@ -39,12 +39,11 @@ impl From<&Cell> for Defaults {
         put("cpu", executor.cpu.map(|v| v.to_string().into()));
         put("priority", executor.priority.map(|v| v.to_string().into()));
         put("record", path(&executor.record));
-        if let Some(start) = cell.postures.get("start") {
-            put("start", Some("start".into()));
-            put("initial", Some(list(start, ",")));
-        } else {
-            put("initial", cell.postures.get("home").map(|home| list(home, ",")));
-        }
+        // Plans begin where the arm stands at first.
+        let begin =
+            ["start", "home"].into_iter().find_map(|name| cell.postures.get_key_value(name));
+        put("start", begin.map(|(name, _)| name.into()));
+        put("initial", begin.map(|(_, joints)| list(joints, ",")));
         let mut many = |flag, values: Vec<OsString>| {
             if !values.is_empty() {
                 all.push((flag, values));
