@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicU64;
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand};
 use nullsweep_ipc_types::{HISTOGRAM_BUCKETS, bucket_upper_ns};
-use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
+use nullsweep_robot::{Arm, ArmSpec, Robot};
 
 use crate::admit::Rules;
 use crate::alarm::Alarm;
@@ -59,9 +59,9 @@ struct RunArgs {
     /// The robot; the embedded PR2 where not given. Its limits are the ones that are enforced.
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
-    /// `right` or `left` for the PR2, else BASE:TIP, two links.
-    #[arg(long, default_value = "right")]
-    arm: String,
+    /// The arm: `right` or `left` of the PR2, else its base and tip link, BASE,TIP.
+    #[arg(long, value_name = "ARM", default_value = "right")]
+    arm: ArmSpec,
     /// Cycles a second.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(50..=4000))]
     rate: u32,
@@ -126,9 +126,9 @@ struct Usage(String);
 pub fn main_with<I, T>(args: I) -> ExitCode
 where
     I: IntoIterator<Item = T>,
-    T: Into<OsString> + Clone,
+    T: Into<OsString>,
 {
-    let cli = match Cli::try_parse_from(args) {
+    let cli: Cli = match nullsweep_cell::parse(args, &[]) {
         Ok(cli) => cli,
         Err(e) => {
             let _ = e.print();
@@ -144,11 +144,21 @@ where
     };
     match result {
         Ok(code) => code,
+        // Whoever reads the output has read enough.
+        Err(e) if e.chain().any(is_broken_pipe) => ExitCode::from(BROKEN_PIPE),
         Err(e) => {
-            last_words(&format!("executor: {e:#}"));
+            last_words(&format!("executor: {}", nullsweep_cell::causes(e.as_ref())));
             ExitCode::from(if e.is::<Usage>() { 2 } else { 1 })
         }
     }
+}
+
+/// The exit code where nobody reads what is written any more: as a shell tells a signal.
+const BROKEN_PIPE: u8 = 128 + 13;
+
+fn is_broken_pipe(cause: &(dyn std::error::Error + 'static)) -> bool {
+    let error = cause.downcast_ref::<std::io::Error>();
+    error.is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
 }
 
 fn run_command(args: &RunArgs) -> anyhow::Result<ExitCode> {
@@ -185,21 +195,13 @@ fn run_logged(args: &RunArgs, lost_lines: Arc<AtomicU64>) -> anyhow::Result<Exit
     Ok(ExitCode::SUCCESS)
 }
 
-fn arm(urdf: Option<&Path>, arm: &str) -> anyhow::Result<Arm> {
+fn arm(urdf: Option<&Path>, arm: &ArmSpec) -> anyhow::Result<Arm> {
     let robot = match urdf {
         Some(path) => Robot::from_urdf_file(path)
             .with_context(|| format!("cannot read the robot from {}", path.display()))?,
         None => Robot::pr2(),
     };
-    let spec = match arm {
-        "right" => ArmSpec::pr2(Side::Right),
-        "left" => ArmSpec::pr2(Side::Left),
-        links => match links.split_once(':') {
-            Some((base, tip)) => ArmSpec { base: base.into(), tip: tip.into() },
-            None => bail!(Usage(format!("--arm takes right, left or BASE:TIP, not {links}"))),
-        },
-    };
-    robot.arm(&spec).with_context(|| format!("arm `{arm}` of robot `{}`", robot.name()))
+    robot.arm(arm).with_context(|| format!("arm {arm} of robot `{}`", robot.name()))
 }
 
 fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {

@@ -9,9 +9,9 @@ use nullsweep_ipc_types::service;
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SystemArgs {
     /// The robot's name in the services' names.
-    #[arg(long, default_value = service::DEFAULT_ROBOT)]
+    #[arg(long, global = true, value_name = "NAME", default_value = service::DEFAULT_ROBOT)]
     pub(crate) robot_name: String,
     /// Folder that isolates this system from others on the machine.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, global = true, value_name = "FOLDER")]
     pub(crate) ipc_root: Option<PathBuf>,
 }

@@ -41,6 +41,7 @@ pub mod verify;
 pub mod link;
 pub mod pipeline;
 pub mod task;
+pub mod transit;
 
 pub use nullsweep_collision as collision;
 pub use nullsweep_robot as robot;
@@ -48,7 +49,7 @@ pub use nullsweep_surface as surface;
 
 pub use collision::Obstacle;
 pub use link::publish::{Join, Patience, PublishError, publish};
-pub use pipeline::{After, Figures, Job, Outcome, PipelineError, StanceChoice, run};
+pub use pipeline::{After, End, Figures, Job, Outcome, PipelineError, StanceChoice, run};
 pub use plan::{CostKind, Method, Plan, PlanError, Profile};
 pub use progress::{Progress, Silent};
 pub use robot::{ArmSpec, JointVector, Robot, Side, Tool};

@@ -8,7 +8,7 @@ mod common;
 use std::path::Path;
 
 use nullsweep_collision::Options;
-use nullsweep_planner::pipeline::{Job, StanceChoice, run};
+use nullsweep_planner::pipeline::{End, Job, StanceChoice, run};
 use nullsweep_planner::plan::{CostKind, Method, Profile};
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::roadmap::GraphConfig;
@@ -63,6 +63,7 @@ fn job(base: [f64; 3], torso: f64) -> Job {
     let held = vec![("torso_lift_joint".to_owned(), torso)];
     Job {
         stance: StanceChoice::Given(Stance { base, held }),
+        end: End::Contact,
         ik_samples: 16,
         graph: GraphConfig { edge_samples: 24, ..GraphConfig::default() },
         refinements: 1,

@@ -27,6 +27,7 @@ mod fingerprint;
 mod ik;
 mod joints;
 mod limits;
+mod named;
 mod pr2;
 mod spec;
 mod tool;

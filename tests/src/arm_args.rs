@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use nullsweep_ipc_types::service;
-use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side};
+use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot};
 
 /// Options that name the robot, its arm and where its services are.
 #[derive(Clone, Debug, clap::Args)]
@@ -13,19 +13,19 @@ pub struct ArmArgs {
     #[arg(long, default_value = service::DEFAULT_ROBOT)]
     pub robot_name: String,
     /// Root path of iceoryx2, to keep one system apart from another
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "FOLDER")]
     pub ipc_root: Option<PathBuf>,
     /// The robot's description; without it, the PR2
     #[arg(long, value_name = "FILE")]
     pub urdf: Option<PathBuf>,
-    /// The arm: right, left, or BASE_LINK:TIP_LINK
+    /// The arm: right or left of the PR2, else its base and tip link, BASE,TIP
     #[arg(long, default_value = "right", value_name = "ARM")]
-    pub arm: String,
+    pub arm: ArmSpec,
     /// Height of the PR2's torso, short for --held torso_lift_joint=H, in m
     #[arg(long, value_name = "H")]
     pub torso: Option<f64>,
     /// Where a joint outside the arm stands; may be given several times
-    #[arg(long, value_name = "JOINT=POSITION", value_parser = held)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = held)]
     pub held: Vec<(String, f64)>,
 }
 
@@ -37,20 +37,10 @@ impl ArmArgs {
                 .with_context(|| format!("cannot use {} as a robot", path.display()))?,
             None => Robot::pr2(),
         };
-        let spec = match self.arm.as_str() {
-            "right" => ArmSpec::pr2(Side::Right),
-            "left" => ArmSpec::pr2(Side::Left),
-            links => {
-                let Some((base, tip)) = links.split_once(':') else {
-                    bail!("--arm {links}: write right, left or BASE_LINK:TIP_LINK");
-                };
-                ArmSpec { base: base.into(), tip: tip.into() }
-            }
-        };
         let mut held: Vec<(&str, f64)> = Vec::new();
         held.extend(self.held.iter().map(|(name, position)| (name.as_str(), *position)));
         held.extend(self.torso.map(|height| ("torso_lift_joint", height)));
-        Ok(robot.arm(&spec)?.with_held(&held)?)
+        Ok(robot.arm(&self.arm)?.with_held(&held)?)
     }
 }
 

@@ -1,10 +1,9 @@
 //! What an arm has swept, from the positions that were measured on it.
 
-use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use nalgebra::Isometry3;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::{Arm, JointVector};
-use nullsweep_surface::Scan;
 use serde::{Deserialize, Serialize};
 
 /// Shares of the surface that were swept.
@@ -24,18 +23,7 @@ pub struct Swept {
 pub fn swept(plan: &Plan, arm: &Arm, postures: impl Iterator<Item = JointVector>) -> Swept {
     let tool = plan.tool.on(arm);
     let poses: Vec<Isometry3<f64>> = postures.map(|q| tool.pose(&q)).collect();
-    let points: Vec<_> = plan.surface.iter().map(|s| Point3::from(s.point)).collect();
-    let scan = Scan {
-        raw: points.clone(),
-        points,
-        normals: plan
-            .surface
-            .iter()
-            .map(|s| UnitVector3::new_normalize(Vector3::from(s.normal)))
-            .collect(),
-        spacing: 0.0,
-    };
-    let hit = coverage::swept(&scan, &poses, &plan.tool);
+    let hit = coverage::swept(&plan.scan(), &poses, &plan.tool);
     let share = |of: &dyn Fn(usize) -> bool| {
         let total = (0..hit.len()).filter(|&i| of(i)).count();
         let swept = (0..hit.len()).filter(|&i| of(i) && hit[i]).count();
@@ -50,6 +38,7 @@ pub fn swept(plan: &Plan, arm: &Arm, postures: impl Iterator<Item = JointVector>
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Point3, Vector3};
     use nullsweep_planner::plan::{CostKind, FORMAT, Method, Profile, SurfaceSample};
     use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
 

@@ -12,6 +12,7 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::Parser;
 use comfy_table::{Table, presets};
+use nullsweep_cell::causes;
 use nullsweep_executor::log::last_words;
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
@@ -103,7 +104,7 @@ pub struct Outcome {
 
 /// Runs the mock with the arguments of a command line, program name first.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args = match Args::try_parse_from(args) {
+    let args: Args = match nullsweep_cell::parse(args, &[]) {
         Ok(args) => args,
         Err(error) => error.exit(),
     };
@@ -111,7 +112,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(outcome) if outcome.violations == 0 => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
-            last_words(&format!("mock-hardware: {error:#}"));
+            last_words(&format!("mock-hardware: {}", causes(error.as_ref())));
             ExitCode::from(2)
         }
     }
@@ -133,7 +134,7 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
     let states = ipc.state_sender()?;
     // Nobody need read it.
     last_words(&format!(
-        "mock-hardware: arm `{}` with {} joints is ready as robot `{}`",
+        "mock-hardware: arm {} with {} joints is ready as robot `{}`",
         args.arm.arm,
         arm.dof(),
         args.arm.robot_name
@@ -213,7 +214,7 @@ fn scene(args: &Args, plan: Option<&Plan>) -> anyhow::Result<(Arm, JointVector)>
     options.held = planned.chain(args.arm.held.iter().cloned()).collect();
     let arm = options.load()?;
     if arm.fingerprint() != plan.fingerprint {
-        bail!("the plan was made for another arm than `{}` of this robot", args.arm.arm);
+        bail!("the plan was made for another arm than {} of this robot", args.arm.arm);
     }
     let first = plan.knots.first().context("the plan has no knots")?.q;
     let first = &first[..arm.dof()];

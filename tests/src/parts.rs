@@ -18,7 +18,7 @@ pub fn begin<A: Parser>(args: impl IntoIterator<Item = OsString>) -> Result<A, E
     let args: Vec<_> = args.into_iter().collect();
     match play(&args) {
         Some(code) => Err(code),
-        None => Ok(A::try_parse_from(args).unwrap_or_else(|error| error.exit())),
+        None => Ok(nullsweep_cell::parse_alone(args).unwrap_or_else(|error| error.exit())),
     }
 }
 

@@ -146,6 +146,8 @@ impl Stage {
             (self.file(&format!("{name}.out")), self.file(&format!("{name}.err")));
         let child = Command::new(program)
             .args(args)
+            // What a user's cell says is not meant for a stage of its own.
+            .env(nullsweep_cell::VARIABLE, "")
             .stdin(Stdio::null())
             .stdout(File::create(&stdout)?)
             .stderr(File::create(&stderr)?)

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use nullsweep_ipc_types::CommandKind;
-use nullsweep_robot::Arm;
+use nullsweep_robot::{Arm, ArmSpec};
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 
 use crate::system::SystemArgs;
@@ -35,9 +35,9 @@ pub(crate) struct TopArgs {
     /// The robot whose joints are named; the embedded PR2 where not given.
     #[arg(long, value_name = "FILE")]
     pub(crate) urdf: Option<PathBuf>,
-    /// `right` or `left` for the PR2, else BASE:TIP, two links.
-    #[arg(long, default_value = "right")]
-    pub(crate) arm: String,
+    /// The arm: `right` or `left` of the PR2, else its base and tip link, BASE,TIP.
+    #[arg(long, value_name = "ARM", default_value = "right")]
+    pub(crate) arm: ArmSpec,
 }
 
 /// Shows the executor's state until `q`.

@@ -4,15 +4,20 @@
 use std::error::Error;
 
 use nullsweep_collision::{CollisionError, MeshError};
+use nullsweep_ipc_types::Mode;
+use nullsweep_planner::link::posture::PostureError;
 use nullsweep_planner::link::publish::PublishError;
 use nullsweep_planner::link::replan::ReplanError;
 use nullsweep_planner::pipeline::PipelineError;
 use nullsweep_planner::plan::PlanError;
 use nullsweep_planner::task::TaskError;
+use nullsweep_planner::transit::{Place, TransitError};
 use nullsweep_surface::ScanError;
 use nullsweep_surface::register::RegisterError;
 use nullsweep_surface::room::LevelError;
 use nullsweep_surface::scan::ScanWarning;
+
+use crate::send::Elsewhere;
 
 /// A line of advice for an error, where a flag can help: that of the outermost cause with any.
 pub(super) fn advice(error: &anyhow::Error) -> Option<String> {
@@ -36,6 +41,12 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         collision(error)
     } else if let Some(error) = error.downcast_ref() {
         Some(register(error).into())
+    } else if let Some(error) = error.downcast_ref() {
+        Some(elsewhere(error))
+    } else if let Some(error) = error.downcast_ref() {
+        transit(error)
+    } else if let Some(error) = error.downcast_ref() {
+        posture(error)
     } else if let Some(LevelError::NoPlane { .. }) = error.downcast_ref() {
         Some(
             "say how the scan stands: --up X,Y,Z (against gravity, in the file's frame) with \
@@ -113,7 +124,7 @@ fn pipeline(error: &PipelineError) -> Option<String> {
 fn task(error: &TaskError) -> Option<String> {
     match error {
         TaskError::NothingMet { .. } => {
-            Some("--chain BASE,TIP names the tip link; --floor says how high the floor is".into())
+            Some("--arm BASE,TIP names the tip link; --floor says how high the floor is".into())
         }
         TaskError::Collision(error) => collision(error),
         _ => None,
@@ -141,6 +152,51 @@ fn publish(error: &PublishError) -> Option<String> {
         }
         PublishError::Plan(error) => return plan(error),
         _ => return None,
+    };
+    Some(text.into())
+}
+
+fn elsewhere(error: &Elsewhere) -> String {
+    let plan = error.plan.as_ref().map_or("PLAN".into(), |plan| plan.display().to_string());
+    format!(
+        "`planner goto --plan {plan} SCAN…` brings it there, with the scans and their flags as they \
+         were given to `plan`; `planner publish {plan} SCAN… --goto` does both"
+    )
+}
+
+fn transit(error: &TransitError) -> Option<String> {
+    let text = match error {
+        TransitError::Hit { place: Place::Here, .. }
+        | TransitError::Limit { place: Place::Here, .. } => {
+            "move the arm to where it is free, by its own controls; where only unseen space is in the \
+             way, --unseen free takes it for free"
+        }
+        TransitError::Hit { .. } | TransitError::Limit { .. } => "choose another posture",
+        TransitError::StanceHit { .. } => {
+            "say where it stands: --base, or --plan PLAN; space that no scan has seen counts as free \
+             with --unseen free"
+        }
+        TransitError::NoWay { .. } => "go by way of another posture, or try another --seed",
+        TransitError::Collision(error) => return collision(error),
+        _ => return None,
+    };
+    Some(text.into())
+}
+
+fn posture(error: &PostureError) -> Option<String> {
+    let text = match error {
+        PostureError::NotHeld(Mode::Executing | Mode::Stopping | Mode::Paused) => {
+            "wait for the plan's end, or `executor ctl stop`"
+        }
+        PostureError::NotHeld(Mode::Fault) => {
+            "`executor ctl status` tells the fault, `reset` clears it"
+        }
+        PostureError::NotHeld(_) => "is the endpoint running? `executor ctl status` tells more",
+        PostureError::OtherArm { .. } => {
+            "--urdf and --arm name the arm, as they do for the executor"
+        }
+        PostureError::Publish(error) => return publish(error),
+        PostureError::Ipc(_) => return None,
     };
     Some(text.into())
 }

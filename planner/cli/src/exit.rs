@@ -14,8 +14,19 @@ pub const VIOLATIONS: u8 = 3;
 /// The executor was lost while its answer or a plan's end was waited for.
 pub const LOST: u8 = 4;
 
+/// Nobody reads what is written any more: as a shell tells a signal.
+pub(super) const BROKEN_PIPE: i32 = 128 + 13;
+
+/// The command line was wrong in a way that shows only when its files are read.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct Usage(pub(super) String);
+
 /// The exit code of a command that failed.
 pub(super) fn of(error: &anyhow::Error) -> u8 {
+    if error.chain().any(|cause| cause.is::<Usage>()) {
+        return USAGE;
+    }
     let lost = error.chain().any(|cause| {
         let publish = match cause.downcast_ref() {
             Some(ReplanError::Publish(error)) => Some(error),
@@ -39,6 +50,7 @@ mod tests {
         assert_eq!(of(&ReplanError::from(lost()).into()), LOST);
         assert_eq!(of(&anyhow::Error::from(lost()).context("while publishing")), LOST);
         assert_eq!(of(&PublishError::NoTelemetry.into()), FAILED);
+        assert_eq!(of(&anyhow::Error::from(Usage("2 of 6".into())).context("--start")), USAGE);
         assert_eq!(of(&ReplanError::from(PublishError::NoTelemetry).into()), FAILED);
     }
 }

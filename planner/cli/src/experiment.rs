@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use nullsweep_experiment::{self as experiment, Object, Plan, Setting};
-use nullsweep_planner::pipeline::{Job, StanceChoice};
+use nullsweep_planner::pipeline::{End, Job, StanceChoice};
 use nullsweep_planner::plan::Method;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::tour::formulation::FormulationConfig;
@@ -71,6 +71,8 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
         tool: Tool { symmetric: args.symmetric, ..Tool::default() },
         stance: StanceChoice::Search(StanceSearch::default()),
         formulation: FormulationConfig { beta: args.beta, ..FormulationConfig::default() },
+        // As in the paper, whose tables know no way back.
+        end: End::Contact,
         seed: args.seed,
         ..Job::new(ArmSpec::pr2(Side::Right))
     };

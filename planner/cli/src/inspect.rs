@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use comfy_table::Table;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nullsweep_planner::cost::{Effort, of_path};
 use nullsweep_planner::plan::Plan;
 use nullsweep_robot::MAX_DOF;
@@ -12,6 +10,8 @@ use serde::Serialize;
 
 use crate::exit::OK;
 use crate::json::write_json;
+use crate::numbers::place;
+use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
 pub(super) struct InspectArgs {
@@ -94,13 +94,9 @@ fn summarise(plan: &Plan) -> Summary {
 }
 
 fn tables(s: &Summary) -> String {
-    let mut plan = Table::new();
-    plan.load_style(UTF8_FULL_CONDENSED).set_header(["plan", ""]);
+    let mut plan = sheet(["plan", ""]);
     plan.add_row(["robot", &format!("{} ({})", s.robot, s.fingerprint)]);
-    plan.add_row([
-        "base x, y, yaw",
-        &format!("{:.3} {:.3} {:.3}", s.base[0], s.base[1], s.base[2]),
-    ]);
+    plan.add_row(["base x, y, yaw", &place(&s.base)]);
     plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
     plan.add_row(["verified", s.unverified_because.as_deref().map_or("yes", |why| why)]);
     plan.add_row(["knots (on the surface)", &format!("{} ({})", s.knots, s.knots_on_surface)]);
@@ -110,8 +106,7 @@ fn tables(s: &Summary) -> String {
     if let Some(knot) = s.continues_at_knot {
         plan.add_row(["continues another plan at knot", &knot.to_string()]);
     }
-    let mut joints = Table::new();
-    joints.load_style(UTF8_FULL_CONDENSED).set_header(["joint", "min", "max", "displacement"]);
+    let mut joints = sheet(["joint", "min", "max", "displacement"]);
     for j in &s.joints {
         joints.add_row([
             j.name.clone(),

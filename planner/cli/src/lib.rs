@@ -2,17 +2,22 @@
 
 mod advice;
 mod bars;
+mod cell;
 mod choices;
 mod exit;
 mod experiment;
 mod export;
+mod goto;
 mod gtsp;
 mod inspect;
 mod json;
 mod numbers;
+mod output;
 mod picture;
 mod placed;
 mod plan;
+mod posture;
+mod posture_arg;
 mod publish;
 mod refusal;
 mod replan;
@@ -21,19 +26,26 @@ mod room;
 mod scene;
 mod scene_command;
 mod scene_file;
+mod send;
+mod sheet;
+mod site;
 mod table;
 mod task;
 mod verify;
 mod view;
 mod views;
+mod way;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
 pub use exit::{FAILED, LOST, OK, USAGE, VIOLATIONS};
 
 use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::{Parser, Subcommand};
+use signal_hook::consts::SIGPIPE;
 
 /// Plans how a redundant arm sweeps a scanned surface, and publishes the plan.
 #[derive(Debug, Parser)]
@@ -50,7 +62,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Make a plan from scans, or from a simulated scan.
-    Plan(Box<plan::PlanArgs>),
+    Plan(Box<plan::PlanCommandArgs>),
     /// Show what is in a scanned scene: its planes, and its objects by number.
     Scene(Box<scene_command::SceneCommandArgs>),
     /// Make a plan through given tool poses.
@@ -60,7 +72,9 @@ enum Command {
     /// Show plans, scans and scenes in a browser: the arm moving, what is swept and what is left.
     View(Box<view::ViewArgs>),
     /// Send a plan to the executor.
-    Publish(publish::PublishArgs),
+    Publish(Box<publish::PublishArgs>),
+    /// Bring the arm from where it is to a posture, or to a plan's start.
+    Goto(Box<goto::GotoArgs>),
     /// Replace the plan that runs by one for what it has not swept yet, without a stop.
     Replan(Box<replan::ReplanArgs>),
     /// Solve a generalized travelling-salesman file.
@@ -69,13 +83,24 @@ enum Command {
     Export(export::ExportArgs),
     /// The paper's tables I and II, our figures beside the published ones.
     Experiment(Box<experiment::ExperimentArgs>),
+    /// Write or check a cell file, which says once which robot and scene all programs mean.
+    Cell(Box<cell::CellArgs>),
     /// Say what a plan file holds.
     Inspect(inspect::InspectArgs),
 }
 
+/// What a plan takes from the plan that it replaces.
+const PLACED: [&str; 3] = ["start", "base", "held"];
+
 /// Runs the command line and returns the process's exit code.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = match Cli::try_parse_from(args) {
+    // Whoever reads the output has read enough: no words about it.
+    let _ = signal_hook::flag::register_conditional_shutdown(
+        SIGPIPE,
+        exit::BROKEN_PIPE,
+        Arc::new(AtomicBool::new(true)),
+    );
+    let cli: Cli = match nullsweep_cell::parse(args, &[("replan", &PLACED)]) {
         Ok(cli) => cli,
         Err(e) => {
             let _ = e.print();
@@ -89,18 +114,20 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::View(args) => view::run(&args),
         Command::Publish(args) => publish::run(&args),
+        Command::Goto(args) => goto::run(&args),
         Command::Replan(args) => replan::run(&args),
         Command::Gtsp(args) => gtsp::run(&args, &mut std::io::stdout().lock())
             .map(|()| OK)
             .map_err(anyhow::Error::from),
         Command::Export(args) => export::run(&args),
         Command::Experiment(args) => experiment::run(&args),
+        Command::Cell(args) => cell::run(&args),
         Command::Inspect(args) => inspect::run(&args),
     };
     match result {
         Ok(code) => ExitCode::from(code),
         Err(e) => {
-            eprintln!("planner: {e:#}");
+            eprintln!("planner: {}", nullsweep_cell::causes(e.as_ref()));
             if let Some(advice) = advice::advice(&e) {
                 eprintln!("help: {advice}");
             }

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nullsweep_robot::wrap;
 
 /// Any finite number.
 pub(super) fn finite(text: &str) -> Result<f64, String> {
@@ -60,4 +61,33 @@ impl<const N: usize> FromStr for Numbers<N> {
         let numbers = values.try_into();
         numbers.map(Self).map_err(|v: Vec<f64>| format!("{} numbers, not {N}", v.len()))
     }
+}
+
+/// The position of a held joint: NAME=VALUE. \[rad\] or \[m\]
+#[derive(Clone, Debug)]
+pub(super) struct Held(pub(super) String, pub(super) f64);
+
+impl FromStr for Held {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, value) = text.split_once('=').ok_or("NAME=VALUE is wanted")?;
+        Ok(Self(name.into(), finite(value).map_err(|e| format!("`{value}`: {e}"))?))
+    }
+}
+
+/// A share for people.
+pub(super) fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
+}
+
+/// A place on the floor for people: metres, and degrees within ±180.
+pub(super) fn place(&[x, y, yaw]: &[f64; 3]) -> String {
+    format!("{x:.3} m, {y:.3} m, {:.1}°", wrap(yaw).to_degrees())
+}
+
+#[test]
+fn a_yaw_is_told_within_half_a_turn() {
+    assert_eq!(place(&[1.0, -0.5, 1.5 * std::f64::consts::PI]), "1.000 m, -0.500 m, -90.0°");
+    assert_eq!(percent(0.9871), "98.71 %");
 }

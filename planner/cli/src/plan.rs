@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::ensure;
+use anyhow::Context;
 use clap::Args;
 use comfy_table::Table;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use nullsweep_planner::pipeline::{self, After, Figures, Job, Outcome, StanceChoice};
+use nullsweep_planner::link::Site;
+use nullsweep_planner::pipeline::{self, After, End, Figures, Job, Outcome, StanceChoice};
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
@@ -16,18 +16,22 @@ use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_report as report;
-use nullsweep_robot::{JointVector, MAX_DOF, Robot, Tool};
+use nullsweep_robot::{Robot, Tool};
 use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg};
 use crate::exit::OK;
 use crate::json::write_json;
-use crate::numbers::{Numbers, finite, not_negative, positive, velocity};
+use crate::numbers::{Held, Numbers, finite, not_negative, percent, place, positive, velocity};
+use crate::output::writable;
 use crate::picture::{Sitter, picture};
+use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
+use crate::sheet::sheet;
+use crate::site::SiteArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -54,11 +58,16 @@ pub(super) struct PlanArgs {
     torso: Option<f64>,
     /// Position of another held joint: NAME=VALUE.
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
-    held: Vec<HeldArg>,
-    /// Where the arm starts: its joints, comma-separated; without it a posture that the SRDF names
-    /// (home before others), or the middle of its ranges, or the nearest free of collision.
-    #[arg(long, value_name = "Q1,Q2,…", allow_hyphen_values = true, value_delimiter = ',', value_parser = finite)]
-    start: Vec<f64>,
+    held: Vec<Held>,
+    /// Where the arm starts: its joints, comma-separated; a posture by its name; or `measured`, where
+    /// the executor holds it. Without it a posture that the SRDF names (home before others), or the
+    /// middle of its ranges, or the nearest free of collision.
+    #[arg(long, value_name = "POSTURE", allow_hyphen_values = true)]
+    start: Option<PostureArg>,
+    /// Where the arm is left: with the tool lifted off the surface, on it (contact), where it started
+    /// (start), or in a posture as for --start.
+    #[arg(long, value_name = "END", allow_hyphen_values = true, default_value = "lifted")]
+    end: EndArg,
 
     /// Go on from knot K of a plan, for the patches that it has not swept by then.
     #[arg(long = "continue", value_name = "PLAN@K")]
@@ -133,15 +142,25 @@ impl FromStr for Base {
     }
 }
 
+/// Where a plan leaves the arm, as it is asked for.
 #[derive(Clone, Debug)]
-struct HeldArg(String, f64);
+enum EndArg {
+    Lifted,
+    Contact,
+    Start,
+    At(PostureArg),
+}
 
-impl FromStr for HeldArg {
+impl FromStr for EndArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (name, value) = text.split_once('=').ok_or("NAME=VALUE is wanted")?;
-        Ok(Self(name.into(), finite(value).map_err(|e| format!("`{value}`: {e}"))?))
+        Ok(match text {
+            "lifted" => Self::Lifted,
+            "contact" => Self::Contact,
+            "start" => Self::Start,
+            posture => Self::At(posture.parse()?),
+        })
     }
 }
 
@@ -161,7 +180,17 @@ impl FromStr for KnotOf {
     }
 }
 
-pub(super) fn run(args: &PlanArgs) -> anyhow::Result<u8> {
+/// A plan by itself, not in place of one that runs.
+#[derive(Debug, Args)]
+pub(super) struct PlanCommandArgs {
+    #[command(flatten)]
+    plan: PlanArgs,
+    #[command(flatten)]
+    site: SiteArgs,
+}
+
+pub(super) fn run(command: &PlanCommandArgs) -> anyhow::Result<u8> {
+    let args = &command.plan;
     let after = match &args.after {
         None => None,
         Some(KnotOf { plan, knot }) => {
@@ -169,16 +198,23 @@ pub(super) fn run(args: &PlanArgs) -> anyhow::Result<u8> {
             Some(After { plan, knot: *knot, held: None, again: args.again })
         }
     };
-    Ok(make(args, after)?.0)
+    Ok(make(args, command.site.site(), after)?.0)
 }
 
 /// Makes a plan, writes what was asked for, and gives the exit code with it.
-pub(super) fn make(args: &PlanArgs, after: Option<After>) -> anyhow::Result<(u8, Plan)> {
+pub(super) fn make(
+    args: &PlanArgs,
+    site: Site<'_>,
+    after: Option<After>,
+) -> anyhow::Result<(u8, Plan)> {
     let bars = Bars::new();
+    for out in [Some(&args.out), args.json.as_ref(), args.report.as_ref()].into_iter().flatten() {
+        writable(out)?;
+    }
     let robot = args.robot.robot()?;
+    let job = job(args, &robot, site, after, &bars)?;
     bars.stage("scan", None);
     let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
-    let job = job(args, &robot, after)?;
     if job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
         let hover = 1e3 * job.tool.hover();
         bars.note(&format!(
@@ -196,16 +232,16 @@ impl PlanArgs {
     /// Whether they say where the plan begins or where the robot stands.
     pub(super) fn is_placed(&self) -> bool {
         let stands = !matches!(self.base, Base::Auto) || self.torso.is_some();
-        self.after.is_some() || !self.start.is_empty() || !self.held.is_empty() || stands
+        self.after.is_some() || self.start.is_some() || !self.held.is_empty() || stands
     }
 }
 
 /// Writes what was asked for and prints the table.
 fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> anyhow::Result<u8> {
     let figures = &outcome.figures;
-    if let Some(path) = &args.json {
-        write_json(figures, path)?;
-    }
+    let violations = &figures.verification.violations;
+    // The plan first: it is there whatever becomes of the rest.
+    let code = write_unless_broken(&outcome.plan, violations, &args.out)?;
     if let Some(path) = &args.report {
         let edges = outcome.graph.edges.iter();
         let data = picture(Sitter {
@@ -224,12 +260,13 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
         })?;
         report::write(path, &data)?;
     }
+    if let Some(path) = &args.json {
+        write_json(figures, path)?;
+    }
     let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
     if !to_stdout {
         println!("{}", table(figures));
     }
-    let violations = &figures.verification.violations;
-    let code = write_unless_broken(&outcome.plan, violations, &args.out)?;
     if code == OK && !to_stdout {
         println!("plan: {}", args.out.display());
         if let Some(path) = &args.report {
@@ -255,8 +292,8 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
     );
     let distance = (mm(v.scan_distance_p95_m), mm(v.scan_distance_max_m));
     [
-        ("coverage of reachable points", format!("{:.4}", v.coverage_reachable)),
-        ("coverage of all points", format!("{:.4}", v.coverage_all)),
+        ("coverage of reachable points", percent(v.coverage_reachable)),
+        ("coverage of all points", percent(v.coverage_all)),
         ("line deviation, max", format!("{:.3} mm", mm(v.line_deviation_max_m))),
         ("distance to the scan, p95, max", format!("{:.2}, {:.2} mm", distance.0, distance.1)),
         (
@@ -281,7 +318,7 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
     row("fill-in patches", f.fill_in_patches.to_string());
     row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
-    row("base x, y, yaw", format!("{:.3}, {:.3}, {:.3}", f.base[0], f.base[1], f.base[2]));
+    row("base x, y, yaw", place(&f.base));
     for (name, position) in &f.held {
         row(name, format!("{position:.3}"));
     }
@@ -306,8 +343,7 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
 }
 
 fn table(figures: &Figures) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+    let mut table = sheet(["figure", "value"]);
     table.add_rows(rows(figures));
     table
 }
@@ -320,7 +356,17 @@ fn figures_table(figures: &Figures) -> report::Table {
     }
 }
 
-fn job(args: &PlanArgs, robot: &Robot, after: Option<After>) -> anyhow::Result<Job> {
+fn job(
+    args: &PlanArgs,
+    robot: &Robot,
+    site: Site<'_>,
+    after: Option<After>,
+    bars: &Bars,
+) -> anyhow::Result<Job> {
+    let arm = robot.arm(&args.robot.spec())?;
+    let posture = |posture: &PostureArg, flag: &'static str| {
+        posture.resolve(&arm, &args.robot, site, bars).context(flag)
+    };
     let tool = args.tool.as_deref().map_or(Ok(Tool::default()), tool_file)?;
     let stance = match (&after, args.base) {
         (Some(after), _) => StanceChoice::Given(Stance {
@@ -329,7 +375,6 @@ fn job(args: &PlanArgs, robot: &Robot, after: Option<After>) -> anyhow::Result<J
         }),
         (None, Base::At(base)) => StanceChoice::Given(Stance { base, held: held(args) }),
         (None, Base::Auto) => {
-            let arm = robot.arm(&args.robot.spec()?)?;
             let mut search =
                 StanceSearch { held: held(args), ..StanceSearch::of(robot, &arm, &tool) };
             if args.torso.is_some() {
@@ -338,14 +383,17 @@ fn job(args: &PlanArgs, robot: &Robot, after: Option<After>) -> anyhow::Result<J
             StanceChoice::Search(search)
         }
     };
-    ensure!(args.start.len() <= MAX_DOF, "--start has more than {MAX_DOF} joints");
-    let mut start: JointVector = JointVector::ZERO;
-    start[..args.start.len()].copy_from_slice(&args.start);
     Ok(Job {
-        arm: args.robot.spec()?,
+        arm: args.robot.spec(),
         tool,
         stance,
-        start: (!args.start.is_empty()).then_some(start),
+        start: args.start.as_ref().map(|start| posture(start, "--start")).transpose()?,
+        end: match &args.end {
+            EndArg::Lifted => End::Lifted,
+            EndArg::Contact => End::Contact,
+            EndArg::Start => End::Start,
+            EndArg::At(end) => End::At(posture(end, "--end")?),
+        },
         after,
         method: args.method.into(),
         cost: args.cost.into(),

@@ -1,40 +1,48 @@
 //! `planner publish`.
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use clap::Args;
-use nullsweep_ipc_types::service::DEFAULT_ROBOT;
-use nullsweep_planner::link::publish::{Join, Patience, describe, publish};
+use nullsweep_planner::link::publish::Join;
 use nullsweep_planner::plan::Plan;
+use nullsweep_robot::Arm;
 
+use crate::bars::Bars;
 use crate::choices::JoinArg;
-use crate::exit::OK;
-use crate::numbers::seconds;
+use crate::exit::{OK, VIOLATIONS};
+use crate::robot::RobotArgs;
+use crate::send::{SendArgs, outlook, resting};
+use crate::site::SiteArgs;
+use crate::way::{Broken, Way, WayArgs};
 
 #[derive(Debug, Args)]
 pub(super) struct PublishArgs {
     /// The plan file.
     plan: PathBuf,
-    /// The robot's name in the service names.
-    #[arg(long, default_value = DEFAULT_ROBOT)]
-    robot_name: String,
-    /// iceoryx2's root path, if not the default.
-    #[arg(long)]
-    ipc_root: Option<PathBuf>,
+    /// With --goto: the scans that the plan was made for, given as they were to `plan`.
+    #[arg(requires = "goto")]
+    scans: Vec<PathBuf>,
+    /// Bring the arm to the plan's start first, free of collision, as `planner goto` does.
+    #[arg(long, conflicts_with = "join")]
+    goto: bool,
     /// How it joins what is going on; without it at its knot for a plan that continues another
     /// one, else after a stop.
     #[arg(long, value_enum)]
     join: Option<JoinArg>,
-    /// Wait for the plan's end as well.
+    /// Wait for the plan's end as well, and show how far it is.
     #[arg(long)]
     wait: bool,
     /// Send a plan that was not verified, or that was changed since.
     #[arg(long)]
     unverified: bool,
-    /// Seconds to wait for the executor's admission.
-    #[arg(long, value_name = "S", default_value = "5", value_parser = seconds)]
-    timeout: Duration,
+    #[command(flatten)]
+    send: SendArgs,
+    #[command(flatten)]
+    site: SiteArgs,
+    #[command(flatten, next_help_heading = "The robot, and what is around it with --goto")]
+    robot: RobotArgs,
+    #[command(flatten)]
+    way: WayArgs,
 }
 
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
@@ -45,11 +53,43 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     }
     let natural = if plan.continues.is_some() { Join::Knot } else { Join::Stop };
     let join = args.join.map_or(natural, Join::from);
-    // An end comes after the plans before it and may be slowed down: be generous.
-    let end = args.wait.then(|| Duration::from_secs_f64(10.0 * plan.duration() + 600.0));
-    let patience = Patience { admission: args.timeout, end };
-    publish(&plan, &args.robot_name, args.ipc_root.as_deref(), join, patience, &mut |event| {
-        println!("{}", describe(event));
-    })?;
+    let site = args.site.site();
+    let arm = args.arm_of(&plan);
+    let first = match args.way_to(&plan) {
+        Err(error) if error.is::<Broken>() => {
+            eprintln!("planner: {error}");
+            return Ok(VIOLATIONS);
+        }
+        first => first?,
+    };
+    let now = arm.as_ref().filter(|_| join == Join::Stop).and_then(|arm| resting(site, arm));
+    if let Some(first) = &first {
+        println!("to the plan's start:");
+        print!("{}", outlook(first, arm.as_ref(), now.as_ref()));
+    }
+    println!("{}:", args.plan.display());
+    let now = now.filter(|_| first.is_none());
+    print!("{}", outlook(&plan, arm.as_ref(), now.as_ref()));
+    args.send.confirm()?;
+    if let Some(first) = &first {
+        args.send.send((first, None), arm.as_ref(), site, Join::Stop, true)?;
+    }
+    args.send.send((&plan, Some(&args.plan)), arm.as_ref(), site, join, args.wait)?;
     Ok(OK)
+}
+
+impl PublishArgs {
+    /// The plan's arm, where the arguments name it: who sends a plan need not say which robot it is of.
+    fn arm_of(&self, plan: &Plan) -> Option<Arm> {
+        let held: Vec<_> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
+        let arm = self.robot.arm().ok()?.with_held(&held).ok()?;
+        (arm.fingerprint() == plan.fingerprint).then_some(arm)
+    }
+
+    /// The way to the plan's start, where one was asked for and is needed.
+    fn way_to(&self, plan: &Plan) -> anyhow::Result<Option<Plan>> {
+        let Some(first) = plan.knots.first().filter(|_| self.goto) else { return Ok(None) };
+        let way = Way::of(plan, &self.robot, self.site.site(), &self.scans);
+        self.way.find(&way, first.q, &Bars::new())
+    }
 }

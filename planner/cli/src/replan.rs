@@ -5,15 +5,16 @@ use std::time::Duration;
 
 use anyhow::ensure;
 use clap::Args;
-use nullsweep_ipc_types::service::DEFAULT_ROBOT;
+use nullsweep_ipc_types::PlanEvent;
 use nullsweep_planner::link::publish::{Patience, describe};
-use nullsweep_planner::link::replan::{Site, Start, replan};
+use nullsweep_planner::link::replan::{Start, replan};
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
 
 use crate::exit::{OK, VIOLATIONS};
 use crate::numbers::seconds;
 use crate::plan::{PlanArgs, make};
+use crate::site::SiteArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct ReplanArgs {
@@ -24,12 +25,8 @@ pub(super) struct ReplanArgs {
     /// Where planning takes longer, the arm is stopped on its path and planned for from there. [s]
     #[arg(long, value_name = "S", default_value = "10", value_parser = seconds)]
     lead: Duration,
-    /// The robot's name in the service names.
-    #[arg(long, default_value = DEFAULT_ROBOT)]
-    robot_name: String,
-    /// iceoryx2's root path, if not the default.
-    #[arg(long)]
-    ipc_root: Option<PathBuf>,
+    #[command(flatten)]
+    site: SiteArgs,
     /// Wait for the new plan's end as well.
     #[arg(long)]
     wait: bool,
@@ -49,7 +46,7 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
     let running = Plan::read(&args.running)?;
     let end = args.wait.then(|| Duration::from_secs_f64(10.0 * running.duration() + 600.0));
     let patience = Patience { admission: args.timeout, end };
-    let site = Site { robot: &args.robot_name, root: args.ipc_root.as_deref() };
+    let site = args.site.site();
     let mut code = OK;
     let mut from = |start: Start| {
         let (knot, held) = match start {
@@ -65,11 +62,11 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
             }
         };
         let after = After { plan: running.clone(), knot, held, again: false };
-        let (made, plan) = make(&args.plan, Some(after)).map_err(|e| format!("{e:#}"))?;
+        let (made, plan) = make(&args.plan, site, Some(after)).map_err(|e| format!("{e:#}"))?;
         code = made;
         if code == VIOLATIONS { Err("it breaks a rule".to_owned()) } else { Ok(plan) }
     };
-    let done = replan(site, &running, args.lead, patience, &mut from, &mut |event| {
+    let done = replan(site, &running, args.lead, patience, &mut from, &mut |event: &PlanEvent| {
         println!("{}", describe(event));
     });
     match done {

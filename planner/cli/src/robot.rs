@@ -6,19 +6,18 @@ use std::str::FromStr;
 use anyhow::Context;
 use clap::Args;
 use nullsweep_collision::{MeshPaths, Options};
-use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
+use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
+
+use crate::posture_arg::NamedPosture;
 
 #[derive(Debug, Args)]
 pub(super) struct RobotArgs {
     /// The robot's URDF; without it the PR2.
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
-    /// Which arm of the PR2.
-    #[arg(long, value_enum, default_value = "right")]
-    arm: ArmSide,
-    /// Base and tip link of another robot's arm: BASE,TIP.
-    #[arg(long, value_name = "BASE,TIP", requires = "urdf")]
-    chain: Option<String>,
+    /// The arm: `right` or `left` of the PR2, else its base and tip link, BASE,TIP.
+    #[arg(long, value_name = "ARM", default_value = "right", alias = "chain")]
+    arm: ArmSpec,
     /// Folder of a ROS package that meshes are in: package://NAME/… is FOLDER/…; may be repeated.
     #[arg(long, value_name = "NAME=FOLDER")]
     package: Vec<Package>,
@@ -28,12 +27,9 @@ pub(super) struct RobotArgs {
     /// Take the pairs of links that may touch from this SRDF instead of finding them.
     #[arg(long, value_name = "FILE")]
     srdf: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum ArmSide {
-    Left,
-    Right,
+    /// A posture with a name, its joints from base to tip; may be repeated.
+    #[arg(long, value_name = "NAME=Q1,Q2,…")]
+    posture: Vec<NamedPosture>,
 }
 
 #[derive(Clone, Debug)]
@@ -57,6 +53,14 @@ fn radius(text: &str) -> Result<f64, String> {
     if value > 0.0 && value < 1.0 { Ok(value) } else { Err("0 to 1 m is wanted".into()) }
 }
 
+/// What a robot and its shapes are read from.
+pub(super) struct Files<'a> {
+    pub(super) urdf: Option<&'a Path>,
+    pub(super) srdf: Option<&'a Path>,
+    pub(super) fit_capsules: Option<f64>,
+    pub(super) packages: Vec<(&'a str, &'a Path)>,
+}
+
 impl RobotArgs {
     pub(super) fn robot(&self) -> anyhow::Result<Robot> {
         Ok(match &self.urdf {
@@ -65,15 +69,32 @@ impl RobotArgs {
         })
     }
 
-    pub(super) fn spec(&self) -> anyhow::Result<ArmSpec> {
-        if let Some(chain) = &self.chain {
-            let (base, tip) = chain.split_once(',').context("--chain: BASE,TIP is wanted")?;
-            return Ok(ArmSpec { base: base.into(), tip: tip.into() });
+    pub(super) fn spec(&self) -> ArmSpec {
+        self.arm.clone()
+    }
+
+    /// The arm, its held joints where the robot has them.
+    pub(super) fn arm(&self) -> anyhow::Result<Arm> {
+        Ok(self.robot()?.arm(&self.arm)?)
+    }
+
+    /// Whether nothing was said of the arm.
+    pub(super) fn is_default_arm(&self) -> bool {
+        self.arm == ArmSpec::pr2(Side::Right)
+    }
+
+    /// What it is read from.
+    pub(super) fn files(&self) -> Files<'_> {
+        Files {
+            urdf: self.urdf.as_deref(),
+            srdf: self.srdf.as_deref(),
+            fit_capsules: self.fit_capsules,
+            packages: self.package.iter().map(|p| (p.0.as_str(), p.1.as_path())).collect(),
         }
-        Ok(ArmSpec::pr2(match self.arm {
-            ArmSide::Left => Side::Left,
-            ArmSide::Right => Side::Right,
-        }))
+    }
+
+    pub(super) fn postures(&self) -> &[NamedPosture] {
+        &self.posture
     }
 
     /// How its collision shapes are found.

@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use comfy_table::Table;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nalgebra::Point3;
 use nullsweep_planner::progress::Progress;
 use nullsweep_report::{self as report, Cloud, LineSet, Paint, Place, PlaceGroup, ReportData};
@@ -16,6 +14,7 @@ use crate::exit::OK;
 use crate::placed::{Gravity, PlacedArgs, read_scans};
 use crate::room::{SEED, name};
 use crate::scene_file::SceneFile;
+use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
 pub(super) struct SceneCommandArgs {
@@ -44,8 +43,7 @@ pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     bars.stage("planes and objects", None);
     let room = Room::find(scan, args.seed);
     bars.clear();
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED).set_header(COLUMNS);
+    let mut table = sheet(COLUMNS);
     table.add_rows(rows(&room));
     println!("{table}");
     if let Some(path) = &args.out {

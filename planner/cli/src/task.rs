@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::Table;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nalgebra::Isometry3;
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
@@ -16,6 +15,7 @@ use crate::json::write_json;
 use crate::numbers::{finite, velocity};
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
+use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
 pub(super) struct TaskArgs {
@@ -72,7 +72,7 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
         floor
     });
     let config = TaskConfig {
-        arm: args.robot.spec()?,
+        arm: args.robot.spec(),
         tool,
         tolerance: args.tolerance,
         held: Vec::new(),
@@ -105,8 +105,7 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
 }
 
 fn table(f: &TaskFigures) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+    let mut table = sheet(["figure", "value"]);
     let mm = |metres: f64| format!("{:.2}", metres * 1e3);
     let deviation = format!("{}, {} mm", mm(f.edge_deviation_p90_m), mm(f.edge_deviation_max_m));
     table.add_rows([

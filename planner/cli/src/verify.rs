@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use comfy_table::Table;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
 use nalgebra::Point3;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
@@ -18,6 +16,7 @@ use crate::plan::verified_rows;
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
 use crate::scene::{Demo, SceneArgs, scene};
+use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
 pub(super) struct VerifyArgs {
@@ -65,7 +64,7 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     if plan.surface.is_empty() {
         scene = scene.in_the_way();
     }
-    let (arm, collision) = (args.robot.spec()?, args.robot.collision());
+    let (arm, collision) = (args.robot.spec(), args.robot.collision());
     let given = Given { robot: &robot, arm: &arm, scene: &scene, collision: &collision };
     bars.stage("verify", Some(plan.knots.len()));
     let found = verify(&plan, given, &|| bars.tick());
@@ -74,8 +73,7 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     match &args.json {
         Some(path) => write_json(&found, path)?,
         None => {
-            let mut table = Table::new();
-            table.load_style(UTF8_FULL_CONDENSED).set_header(["figure", "value"]);
+            let mut table = sheet(["figure", "value"]);
             table.add_rows(verified_rows(&found));
             println!("{table}");
         }

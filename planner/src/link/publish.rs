@@ -67,9 +67,23 @@ pub enum PublishError {
     EndedEarly(Box<PlanEvent>),
 }
 
+/// Who is told what becomes of a plan.
+pub trait Watcher {
+    /// An event of the plan.
+    fn event(&mut self, event: &PlanEvent);
+    /// How far the executor is: its newest telemetry while the plan's end is waited for.
+    fn progress(&mut self, _: &Telemetry) {}
+}
+
+impl<F: FnMut(&PlanEvent)> Watcher for F {
+    fn event(&mut self, event: &PlanEvent) {
+        self(event);
+    }
+}
+
 /// Publishes the plan to `robot`'s executor and waits for its admission and, if asked, its end.
 /// The executor is told whether the plan is as it was verified, and tells it on while the plan runs.
-/// `seen` is called with every event of this plan. Returns the plan's id. An executor that dies
+/// `watcher` is told every event of this plan. Returns the plan's id. An executor that dies
 /// meanwhile is noticed within a second.
 ///
 /// # Errors
@@ -81,7 +95,7 @@ pub fn publish(
     root: Option<&Path>,
     join: Join,
     patience: Patience,
-    seen: &mut dyn FnMut(&PlanEvent),
+    watcher: &mut dyn Watcher,
 ) -> Result<PlanId, PublishError> {
     let (mut header, knots) = plan.message_parts()?;
     header.verified = u32::from(plan.check_seal().is_ok());
@@ -111,7 +125,7 @@ pub fn publish(
         while start.elapsed() < limit {
             while let Some(event) = events.receive()? {
                 if event.plan == id {
-                    seen(&event);
+                    watcher.event(&event);
                     if EventKind::from_wire(event.kind).is_some_and(wanted) {
                         return Ok::<_, PublishError>(Some(event));
                     }
@@ -119,6 +133,9 @@ pub fn publish(
             }
             if let Some(lost) = pulse.look()? {
                 return Err(PublishError::Lost(Box::new(lost)));
+            }
+            if let Some(telemetry) = pulse.last() {
+                watcher.progress(telemetry);
             }
             std::thread::sleep(Duration::from_millis(2));
         }

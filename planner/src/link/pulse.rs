@@ -69,6 +69,11 @@ impl<'a> Pulse<'a> {
         Self { ipc, telemetry, last: None, heard: now, sought: now }
     }
 
+    /// The newest telemetry that was heard.
+    pub(super) fn last(&self) -> Option<&Telemetry> {
+        self.last.as_ref()
+    }
+
     /// How the executor was lost, if it was. One that was never heard is not judged: it may be
     /// about to start. Call it every few milliseconds.
     pub(super) fn look(&mut self) -> Result<Option<Lost>, PortError> {

@@ -2,7 +2,6 @@
 //! the new plan is made before the arm gets there, or else from where the arm is stopped.
 
 use std::fmt;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError, Receiver};
@@ -11,8 +10,9 @@ use nullsweep_ipc_types::{
 };
 use nullsweep_robot::{JointVector, MAX_DOF};
 
-use crate::link::publish::{Join, Patience, PublishError, newest_telemetry, publish};
+use crate::link::publish::{Join, Patience, PublishError, Watcher, newest_telemetry, publish};
 use crate::link::pulse::Pulse;
+use crate::link::site::Site;
 use crate::plan::Plan;
 
 /// How far the arm may be commanded from the plan that it is said to run: cubic segments leave the
@@ -97,18 +97,9 @@ pub enum ReplanError {
     Make(String),
 }
 
-/// Where the executor is.
-#[derive(Clone, Copy, Debug)]
-pub struct Site<'a> {
-    /// The robot's name in the services' names.
-    pub robot: &'a str,
-    /// Root path of iceoryx2, `None` for the default.
-    pub root: Option<&'a Path>,
-}
-
 /// Replaces the plan that runs by one that `make` makes from the start that it is given. `lead` is
 /// how long that may take; where it takes longer and the knot has passed, the arm is stopped on its
-/// path and `make` is called once more. `seen` gets every event of the new plan.
+/// path and `make` is called once more. `watcher` is told every event of the new plan.
 ///
 /// # Errors
 /// See [`ReplanError`].
@@ -118,7 +109,7 @@ pub fn replan(
     lead: Duration,
     patience: Patience,
     make: &mut dyn FnMut(Start) -> Result<Plan, String>,
-    seen: &mut dyn FnMut(&PlanEvent),
+    watcher: &mut dyn Watcher,
 ) -> Result<Replanned, ReplanError> {
     let ipc = Ipc::open(site.robot, site.root)?;
     let telemetry = newest_telemetry(&ipc, patience.admission)?;
@@ -132,7 +123,7 @@ pub fn replan(
     // Whoever published another plan meanwhile wants that one.
     let still = newest_telemetry(&ipc, patience.admission)?;
     if still.plan == old {
-        match publish(&plan, site.robot, site.root, Join::Knot, patience, seen) {
+        match publish(&plan, site.robot, site.root, Join::Knot, patience, watcher) {
             Ok(plan) => return Ok(Replanned { plan, start: Start::Knot(knot), late: false }),
             Err(PublishError::NothingRuns) => {}
             Err(PublishError::Rejected(why)) if is_late(&why) => {}
@@ -143,7 +134,7 @@ pub fn replan(
     }
     let start = stop(&ipc, old, knot, patience.admission)?;
     let plan = make(start).map_err(ReplanError::Make)?;
-    let plan = publish(&plan, site.robot, site.root, Join::Stop, patience, seen)?;
+    let plan = publish(&plan, site.robot, site.root, Join::Stop, patience, watcher)?;
     Ok(Replanned { plan, start, late: true })
 }
 

@@ -10,7 +10,7 @@ use super::job::Job;
 use crate::cost::{Cost, Effort, TaskTime};
 use crate::motion::{Leg, Mover, layered};
 use crate::plan::{Continues, CostKind, Method, Plan};
-use crate::progress::Progress;
+use crate::progress::{Progress, left_out};
 use crate::roadmap::{Graph, Nodes, graph};
 use crate::sweep::{contact_motion, coverage};
 use crate::tour::formulation::{self, Stop};
@@ -181,10 +181,11 @@ impl TourContext<'_> {
         let mover = Mover::new(cell, self.graph, &stops, cost, start, job.seed);
         let mut dropped = Vec::new();
         let path = layered::shortest(cost, continuous, &start, &layers, &mover, &mut |layer| {
-            let patch = stops[layer];
-            progress.note(&format!("patch {patch} is left out: no motion to it was found"));
-            dropped.push(patch);
+            dropped.push(stops[layer]);
         });
+        if !dropped.is_empty() {
+            progress.note(&left_out(["patch", "patches"], &dropped, "no motion there was found"));
+        }
         if path.layers.is_empty() {
             return Err(PipelineError::NoMotion { reachable: tour.len() });
         }

@@ -21,6 +21,8 @@ pub struct Job {
     /// Where the arm is; `None`: a posture that the SRDF names (home before others), else the middle
     /// of its ranges, or where it collides there the nearest free posture found. \[rad\] or \[m\]
     pub start: Option<JointVector>,
+    /// Where the arm is left.
+    pub end: End,
     /// A plan that this one goes on from.
     pub after: Option<After>,
     /// How the order is found.
@@ -58,6 +60,7 @@ impl Job {
             tool: Tool::default(),
             stance: StanceChoice::Auto,
             start: None,
+            end: End::default(),
             after: None,
             method: Method::Curvature,
             cost: CostKind::Time,
@@ -83,6 +86,20 @@ pub enum StanceChoice {
     Given(Stance),
     /// Where it reaches most of what is searched.
     Search(StanceSearch),
+}
+
+/// Where a plan leaves the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum End {
+    /// With the tool lifted off the surface, so that the next plan, or the way home, starts free.
+    #[default]
+    Lifted,
+    /// Where the plan began, so that it can run again.
+    Start,
+    /// In this posture. \[rad\] or \[m\]
+    At(JointVector),
+    /// On the surface, at the last stop.
+    Contact,
 }
 
 /// The plan and the knot that a new plan goes on from.

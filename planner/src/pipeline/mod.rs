@@ -4,6 +4,7 @@ mod assemble;
 mod attempt;
 mod clock;
 mod completion;
+mod end;
 mod error;
 mod figures;
 mod job;
@@ -16,6 +17,6 @@ mod swept;
 
 pub use error::PipelineError;
 pub use figures::Figures;
-pub use job::{After, Job, StanceChoice};
+pub use job::{After, End, Job, StanceChoice};
 pub use left_out::LeftOut;
 pub use run::{Outcome, run};

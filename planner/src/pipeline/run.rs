@@ -106,6 +106,7 @@ pub fn run(
     };
     let best = search(&planning, patches, samples, &mut clock)?;
     let Attempt { patches, graph, sequence, mut plan, .. } = best;
+    planning.leave(&mut plan);
     if job.profile == Profile::Acceleration {
         progress.stage("timing", None);
         plan = clock.time("timing", || accelerate(&plan, cell, &Limits::of(&arm, job.v_max), &[]));

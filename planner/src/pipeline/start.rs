@@ -7,6 +7,7 @@ use super::error::PipelineError;
 use super::job::{After, Job};
 use crate::plan::Profile;
 use crate::timing::{Limits, Rest};
+use crate::workcell::nearest_free;
 
 /// The way to rest on the path of the plan that a job joins in motion; `None` where it does not.
 pub(super) fn rest_before(job: &Job, arm: &Arm) -> Option<Rest> {
@@ -22,9 +23,6 @@ pub(super) struct Start {
     /// What a user should know who did not say where the arm is.
     pub(super) note: Option<String>,
 }
-
-/// Postures that are tried where the arm collides at home.
-const TRIED: usize = 1000;
 
 /// The joint vector that the plan starts from: that of the plan it goes on from, the one asked for,
 /// or a posture inside the limits and free of collision, the nearest to home that is found.
@@ -80,19 +78,4 @@ fn posture(arm: &Arm, state: &collision::GroupState) -> Option<JointVector> {
         *value = state.joints.iter().find(|(joint, _)| joint == name)?.1;
     }
     Some(JointVector::new(q))
-}
-
-/// The posture nearest to `home`, as shares of the joints' ranges, of many that are spread over
-/// them, the tool clear of everything.
-fn nearest_free(arm: &Arm, world: &World, home: &JointVector) -> Option<JointVector> {
-    let apart = |q: &JointVector| -> f64 {
-        let share = |(j, &(low, high)): (usize, &(f64, f64))| {
-            let width = if low.is_finite() { high - low } else { std::f64::consts::TAU };
-            ((q[j] - home[j]) / width.max(f64::MIN_POSITIVE)).powi(2)
-        };
-        arm.margined_limits().iter().enumerate().map(share).sum()
-    };
-    let mut tried: Vec<JointVector> = (0..TRIED).map(|k| arm.spread(k)).collect();
-    tried.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
-    tried.into_iter().find(|q| world.is_free(q, ToolContact::Forbidden))
 }

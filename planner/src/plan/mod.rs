@@ -9,6 +9,7 @@ mod knot;
 mod message;
 mod seal;
 mod settings;
+mod surface;
 mod trajectory;
 
 pub use curve::Curve;

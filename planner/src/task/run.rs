@@ -16,7 +16,7 @@ use super::space::{Point, RESIDUAL, Space};
 use crate::cost::{self, Effort};
 use crate::motion::reconfigure;
 use crate::plan::Plan;
-use crate::progress::Progress;
+use crate::progress::{Progress, left_out};
 use crate::verify::{Given, Verification, verify};
 use crate::workcell::{Scene, Workcell};
 
@@ -47,8 +47,8 @@ pub fn run(
     let world = World::new(robot, &arm, &config.tool, &[], &config.obstacles, &config.collision)?;
     let space = Space::new(&arm, &world, &config.tool, &config.tolerance);
     let (mut route, unmet) = search(space, poses, config, progress)?;
-    for pose in unmet {
-        progress.note(&format!("pose {pose} is left out: no joint vector meets it"));
+    if !unmet.is_empty() {
+        progress.note(&left_out(["pose", "poses"], &unmet, "no joint vector meets it"));
     }
     let cell = Workcell { arm: &arm, tool: &config.tool, world: &world };
     let edges = connect(&space, cell, &mut route, config.seed, progress);

@@ -151,17 +151,8 @@ pub fn verify(
     let scene = given.scene.transformed(&plan.base_pose().inverse());
     let scan = &scene.surface;
     let is_scanned = !scan.points.is_empty();
-    if is_scanned && plan.surface.len() != scan.points.len() {
-        let (planned, found) = (plan.surface.len(), scan.points.len());
-        return Err(VerifyError::OtherScan { planned, found });
-    }
     if is_scanned {
-        for (point, (sample, scanned)) in plan.surface.iter().zip(&scan.points).enumerate() {
-            let distance_m = (Point3::from(sample.point) - scanned).norm();
-            if distance_m > SAME_PLACE || distance_m.is_nan() {
-                return Err(VerifyError::MovedScan { point, distance_m });
-            }
-        }
+        same_scan(plan, scan)?;
     }
     let mut violations = kinematics(plan, &arm);
     let is_finite = !violations.iter().any(|v| v.kind == ViolationKind::NotFinite);
@@ -203,6 +194,24 @@ pub fn verify(
         coverage_reachable: share(&|i| plan.surface[i].reachable),
         swept,
     })
+}
+
+/// Whether a scan, in the root frame, is the one that a plan was made for.
+///
+/// # Errors
+/// [`VerifyError::OtherScan`] or [`VerifyError::MovedScan`].
+pub fn same_scan(plan: &Plan, scan: &Scan) -> Result<(), VerifyError> {
+    let (planned, found) = (plan.surface.len(), scan.points.len());
+    if planned != found {
+        return Err(VerifyError::OtherScan { planned, found });
+    }
+    for (point, (sample, scanned)) in plan.surface.iter().zip(&scan.points).enumerate() {
+        let distance_m = (Point3::from(sample.point) - scanned).norm();
+        if distance_m > SAME_PLACE || distance_m.is_nan() {
+            return Err(VerifyError::MovedScan { point, distance_m });
+        }
+    }
+    Ok(())
 }
 
 /// The arm as the plan has it: its held joints where the plan holds them.

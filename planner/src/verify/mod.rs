@@ -15,6 +15,6 @@ mod percentile;
 mod press;
 mod violation;
 
-pub use gate::{Against, Given, Verification, VerifyError, verify};
+pub use gate::{Against, Given, Verification, VerifyError, same_scan, verify};
 pub use press::{Press, press_depths};
 pub use violation::{Violation, ViolationKind};

@@ -2,6 +2,7 @@
 
 mod bed;
 mod contact;
+mod free;
 mod obstruction;
 mod reach;
 mod sample;
@@ -10,6 +11,7 @@ pub mod stance;
 
 pub use bed::Bed;
 pub use contact::{contact_pose, direction, heading_of, tangents};
+pub use free::nearest_free;
 pub use obstruction::{Cause, Obstruction, obstruction};
 pub use reach::reach;
 pub use sample::{Sample, Workcell, middle_out, redundancies};

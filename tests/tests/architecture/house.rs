@@ -27,6 +27,7 @@ const fn with(dir: &'static str, may: &'static [&'static str]) -> Crate {
 pub(crate) const CRATES: &[Crate] = &[
     leaf("ipc-types"),
     leaf("robot"),
+    leaf("robot/cell"),
     leaf("planner/gtsp"),
     leaf("planner/grid"),
     with("planner/surface", &["planner/grid"]),
@@ -50,10 +51,12 @@ pub(crate) const CRATES: &[Crate] = &[
             "planner/report",
             "planner/experiment",
             "robot",
+            "robot/cell",
             "ipc-types",
         ],
     ),
-    with("executor", &["ipc-types", "robot"]),
+    with("planner/front", &["robot/cell"]),
+    with("executor", &["ipc-types", "robot", "robot/cell"]),
     with("bridge", &["ipc-types", "robot", "executor"]),
     Crate { dir: "tests", may: May::ImportAll, dev: &[] },
     with(
@@ -115,9 +118,10 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("timing", BELOW_3),
     ("verify", &["progress", "cost", "workcell", "plan", "sweep"]),
     ("link", BELOW_3),
-    // 4: neither imports the other
+    // 4: none imports another
     ("pipeline", BELOW_4),
     ("task", BELOW_4),
+    ("transit", BELOW_4),
 ];
 
 #[rustfmt::skip]
@@ -133,7 +137,7 @@ const SURFACE: &[&str] =
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[
     // What is wrong in the search must not be wrong in the verification too.
-    ("planner/src", "verify", &["roadmap", "tour", "motion", "pipeline", "task"]),
+    ("planner/src", "verify", &["roadmap", "tour", "motion", "pipeline", "task", "transit"]),
     ("planner/src", "roadmap", &["verify"]),
     ("planner/src", "tour", &["verify"]),
     ("planner/src", "motion", &["verify"]),
@@ -143,7 +147,20 @@ pub(crate) const APART: &[(&str, &str, &[&str])] = &[
 /// Libraries of others, and the only folders that may name them.
 pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("parry3d-f64", &["planner/collision"]),
-    ("clap", &["planner/cli", "executor", "tests", "pr2-bridge", "ros2-bridge"]),
+    (
+        "clap",
+        &[
+            "robot/cell",
+            "planner/cli",
+            "planner/front",
+            "executor",
+            "tests",
+            "pr2-bridge",
+            "ros2-bridge",
+        ],
+    ),
+    ("clap_complete", &["planner/front"]),
+    ("clap_mangen", &["planner/front"]),
     ("ratatui", &["executor/src/top"]),
     ("indicatif", &["planner/cli"]),
     ("plotly", &["tests"]),
@@ -155,7 +172,8 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
 pub(crate) const REFUSALS: &[&str] = &["ViolationKind", "Reason", "Fault"];
 
 /// Programs whose subcommands the documents may name.
-pub(crate) const PROGRAMS: &[&str] = &["planner", "executor", "pr2-bridge", "ros2-bridge"];
+pub(crate) const PROGRAMS: &[&str] =
+    &["planner", "executor", "nullsweep", "pr2-bridge", "ros2-bridge"];
 
 /// The most lines of a file.
 pub(crate) const FILE_LINES: usize = 450;

@@ -9,3 +9,4 @@ mod reject;
 mod replan;
 mod rig;
 mod run;
+mod twice;

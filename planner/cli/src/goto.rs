@@ -1,0 +1,142 @@
+//! `planner goto`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use nullsweep_planner::link::publish::Join;
+use nullsweep_planner::plan::Plan;
+use nullsweep_planner::workcell::Stance;
+use nullsweep_robot::{JointVector, Tool};
+
+use crate::bars::Bars;
+use crate::exit::{OK, Usage, VIOLATIONS};
+use crate::numbers::{Held, Numbers};
+use crate::output::writable;
+use crate::posture_arg::PostureArg;
+use crate::robot::{RobotArgs, tool_file};
+use crate::send::{SendArgs, outlook, resting};
+use crate::site::SiteArgs;
+use crate::way::{Broken, Way, WayArgs};
+
+#[derive(Debug, Args)]
+pub(super) struct GotoArgs {
+    /// Where to: a posture by its name (home, start, …) or its joints, Q1,Q2,…; left out where --plan
+    /// says it.
+    #[arg(value_name = "POSTURE", allow_hyphen_values = true)]
+    target: Option<String>,
+    /// The scans of what is around the arm, as they were given to `plan`.
+    scans: Vec<PathBuf>,
+    /// To this plan's first knot, or, with a posture, standing as that plan has it.
+    #[arg(long, value_name = "PLAN")]
+    plan: Option<PathBuf>,
+    /// Where the robot stands in the floor frame, without a plan: x,y,yaw.
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true)]
+    base: Option<Numbers<3>>,
+    /// Height of the PR2's torso joint, without a plan. [m]
+    #[arg(long, value_name = "M", value_parser = crate::numbers::finite)]
+    torso: Option<f64>,
+    /// Position of another held joint, without a plan: NAME=VALUE.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    held: Vec<Held>,
+    /// The tool, a TOML file, without a plan; else a sponge of 0.10 × 0.07 m.
+    #[arg(long, value_name = "FILE")]
+    tool: Option<PathBuf>,
+    #[command(flatten)]
+    robot: RobotArgs,
+    #[command(flatten)]
+    way: WayArgs,
+    #[command(flatten)]
+    site: SiteArgs,
+    #[command(flatten)]
+    send: SendArgs,
+    /// Write the plan here instead of sending it: `planner publish` does that.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &GotoArgs) -> anyhow::Result<u8> {
+    if let Some(out) = &args.out {
+        writable(out)?;
+    }
+    let bars = Bars::new();
+    let plan = args.plan.as_deref().map(Plan::read).transpose()?;
+    let (target, scans) = args.asked(plan.is_some())?;
+    let way = match &plan {
+        Some(plan) => Way::of(plan, &args.robot, args.site.site(), &scans),
+        None => args.standing(&scans)?,
+    };
+    let arm = way.arm()?;
+    let to = match (&target, &plan) {
+        (Some(posture), _) => posture.resolve(&arm, &args.robot, args.site.site(), &bars)?,
+        (None, Some(plan)) => first(plan)?,
+        (None, None) => return Err(Usage(WHERE.into()).into()),
+    };
+    let found = match args.way.find(&way, to, &bars) {
+        Err(error) if error.is::<Broken>() => {
+            eprintln!("planner: {error}");
+            return Ok(VIOLATIONS);
+        }
+        found => found?,
+    };
+    let Some(found) = found else {
+        println!("the arm is there already");
+        return Ok(OK);
+    };
+    print!("{}", outlook(&found, Some(&arm), resting(args.site.site(), &arm).as_ref()));
+    if let Some(out) = &args.out {
+        found.write(out)?;
+        println!("plan: {}", out.display());
+        return Ok(OK);
+    }
+    args.send.confirm()?;
+    args.send.send((&found, None), Some(&arm), args.site.site(), Join::Stop, true)?;
+    Ok(OK)
+}
+
+const WHERE: &str = "where to? Give a posture (home, or its joints Q1,Q2,…) or --plan PLAN";
+
+/// Where a plan begins.
+fn first(plan: &Plan) -> anyhow::Result<JointVector> {
+    Ok(plan.knots.first().context("the plan has no knots")?.q)
+}
+
+impl GotoArgs {
+    /// The posture that is asked for, and the scans. With a plan the posture may be left out.
+    fn asked(&self, planned: bool) -> anyhow::Result<(Option<PostureArg>, Vec<PathBuf>)> {
+        let Some(first) = &self.target else { return Ok((None, Vec::new())) };
+        if planned && Path::new(first).exists() {
+            let first = PathBuf::from(first);
+            return Ok((None, std::iter::once(first).chain(self.scans.iter().cloned()).collect()));
+        }
+        match first.parse::<PostureArg>() {
+            Ok(posture) => Ok((Some(posture), self.scans.clone())),
+            Err(why) => {
+                Err(Usage(format!("`{first}` is neither a posture nor a file: {why}")).into())
+            }
+        }
+    }
+
+    /// Where the arguments have the robot stand.
+    fn standing<'a>(&'a self, scans: &'a [PathBuf]) -> anyhow::Result<Way<'a>> {
+        let torso = self.torso.map(|height| ("torso_lift_joint".to_owned(), height));
+        let held = torso.into_iter().chain(self.held.iter().map(|h| (h.0.clone(), h.1))).collect();
+        let base = match self.base {
+            Some(Numbers(base)) => base,
+            None if scans.is_empty() && !self.way.has_demo() => [0.0; 3],
+            None => {
+                let say = "where does the robot stand? Give --base x,y,yaw, or --plan PLAN for where \
+                           that plan has it";
+                return Err(Usage(say.into()).into());
+            }
+        };
+        Ok(Way {
+            robot: &self.robot,
+            site: self.site.site(),
+            scans,
+            stance: Stance { base, held },
+            tool: self.tool.as_deref().map_or(Ok(Tool::default()), tool_file)?,
+            plan: None,
+        })
+    }
+}

@@ -1,0 +1,193 @@
+//! Sending a plan to the executor: what will happen is told and asked for, then what happens is shown.
+
+use std::fmt::Write as _;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use nullsweep_ipc_types::{Mode, PlanEvent, Reason, Telemetry};
+use nullsweep_planner::link::Site;
+use nullsweep_planner::link::posture::{Posture, posture, unit};
+use nullsweep_planner::link::publish::{Join, Patience, PublishError, Watcher, describe, publish};
+use nullsweep_planner::plan::{Plan, Stretch};
+use nullsweep_planner::sweep::coverage;
+use nullsweep_robot::Arm;
+
+use crate::numbers::seconds;
+
+#[derive(Debug, Args)]
+pub(super) struct SendArgs {
+    /// Do not ask before the arm moves. Nothing is asked either where standard input is no terminal.
+    #[arg(long, short)]
+    yes: bool,
+    /// Seconds to wait for the executor's admission.
+    #[arg(long, value_name = "S", default_value = "5", value_parser = seconds)]
+    timeout: Duration,
+}
+
+/// How long the executor is listened to for where the arm is, where that must be known, and where it is
+/// only told.
+pub(super) const LISTEN: Duration = Duration::from_secs(5);
+const LOOK: Duration = Duration::from_secs(1);
+/// A way to a plan's start that is worth a word. \[rad\] or \[m\]
+const WORTH: f64 = 0.001;
+
+/// The plan was rejected because the arm is elsewhere.
+#[derive(Debug, thiserror::Error)]
+#[error("rejected: the arm is not where the plan starts: {}", .joints.join(", "))]
+pub(super) struct Elsewhere {
+    /// Each joint that is too far away, and by how much.
+    joints: Vec<String>,
+    /// The plan's file, if it has one.
+    pub(super) plan: Option<PathBuf>,
+}
+
+/// The user said no.
+#[derive(Debug, thiserror::Error)]
+#[error("nothing was sent")]
+pub(super) struct NotSent;
+
+/// Where the arm is, if it rests.
+pub(super) fn resting(site: Site<'_>, arm: &Arm) -> Option<Posture> {
+    posture(site, arm, LOOK).ok()
+}
+
+/// How far each joint is from a plan's start, by name, where it is by more than `bound`.
+fn apart(plan: &Plan, arm: &Arm, now: &Posture, bound: f64) -> Vec<String> {
+    let Some(first) = plan.knots.first() else { return Vec::new() };
+    let apart = arm.continuous().displacement(&now.q, &first.q);
+    let joints = arm.joint_names().iter().enumerate().zip(&apart);
+    let far = joints.filter(|(_, apart)| apart.abs() > bound);
+    far.map(|((j, name), apart)| format!("{name} by {apart:.3} {}", unit(arm, j))).collect()
+}
+
+/// What a plan will do, a line each.
+pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: &str| {
+        let _ = writeln!(text, "  {name:<9} {value}");
+    };
+    let joints = (plan.joints.first(), plan.joints.last());
+    if let (Some(first), Some(last)) = joints {
+        line("robot", &format!("{}, {first} … {last}", plan.robot));
+    }
+    if let (Some(arm), Some(now)) = (arm, now) {
+        let far = apart(plan, arm, now, WORTH);
+        match &far[..] {
+            [] => line("starts", "where the arm is"),
+            far => far.iter().enumerate().for_each(|(i, far)| {
+                line(if i == 0 { "starts" } else { "" }, &format!("away: {far}"));
+            }),
+        }
+    }
+    line("takes", &format!("{:.1} s at full speed", plan.duration()));
+    if let Some([reachable, all]) = arm.and_then(|arm| swept(plan, arm)) {
+        let share = |share: f64| format!("{:.1} %", 100.0 * share);
+        let (reachable, all) = (share(reachable), share(all));
+        line("sweeps", &format!("{reachable} of what is reachable, {all} of all points"));
+    }
+    let on_surface = plan.knots.last().is_some_and(|knot| knot.line.is_some());
+    line("ends", if on_surface { "on the surface" } else { "off the surface" });
+    text
+}
+
+/// Shares of the plan's reachable points, and of all, that are swept by its end; none of a plan that is
+/// to sweep nothing.
+fn swept(plan: &Plan, arm: &Arm) -> Option<[f64; 2]> {
+    let reachable = plan.surface.iter().filter(|s| s.reachable).count();
+    if reachable == 0 || plan.check_bounds().is_err() {
+        return None;
+    }
+    let followed = plan.followed(plan.knots.len());
+    let swept = coverage::swept_by(&plan.scan(), followed.iter().map(Stretch::trajectory), arm);
+    let hit = swept.iter().zip(&plan.surface).filter(|(swept, s)| **swept && s.reachable).count();
+    Some([hit as f64 / reachable as f64, coverage::share(&swept)])
+}
+
+impl SendArgs {
+    /// Asks whether to go on, where there is somebody to ask.
+    pub(super) fn confirm(&self) -> Result<(), NotSent> {
+        if self.yes || !std::io::stdin().is_terminal() {
+            return Ok(());
+        }
+        eprint!("move the arm? [y/N] ");
+        let _ = std::io::stderr().flush();
+        let mut answer = String::new();
+        let read = std::io::stdin().read_line(&mut answer);
+        let yes = matches!(answer.trim().to_lowercase().as_str(), "y" | "yes");
+        if read.is_ok() && yes { Ok(()) } else { Err(NotSent) }
+    }
+
+    /// Sends a plan, shows how far it is while its end is waited for, and tells what became of it.
+    ///
+    /// # Errors
+    /// As [`publish`]; [`Elsewhere`] where the arm is not where the plan starts.
+    pub(super) fn send(
+        &self,
+        (plan, file): (&Plan, Option<&Path>),
+        arm: Option<&Arm>,
+        site: Site<'_>,
+        join: Join,
+        wait: bool,
+    ) -> anyhow::Result<()> {
+        // An end comes after the plans before it and may be slowed down: be generous.
+        let end = wait.then(|| Duration::from_secs_f64(10.0 * plan.duration() + 600.0));
+        let patience = Patience { admission: self.timeout, end };
+        let mut show = Show::new(plan);
+        let sent = publish(plan, site.robot, site.root, join, patience, &mut show);
+        show.bar.finish_and_clear();
+        let Err(error) = sent else { return Ok(()) };
+        if let (PublishError::Rejected(why), Some(arm)) = (&error, arm)
+            && Reason::from_wire(why.reason) == Some(Reason::Start)
+            && let Some(now) = resting(site, arm)
+        {
+            let joints = apart(plan, arm, &now, why.bound);
+            if !joints.is_empty() {
+                return Err(Elsewhere { joints, plan: file.map(Path::to_path_buf) }.into());
+            }
+        }
+        Err(error.into())
+    }
+}
+
+/// Steps of the bar: thousandths.
+const STEPS: u64 = 1000;
+
+/// Events as lines, and a bar with the time that is left.
+struct Show {
+    bar: ProgressBar,
+    duration: f64,
+}
+
+impl Show {
+    fn new(plan: &Plan) -> Self {
+        let bar = ProgressBar::new(STEPS);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3} % {msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, duration: plan.duration() }
+    }
+}
+
+impl Watcher for Show {
+    fn event(&mut self, event: &PlanEvent) {
+        self.bar.suspend(|| println!("{}", describe(event)));
+    }
+
+    fn progress(&mut self, telemetry: &Telemetry) {
+        if !telemetry.plan.is_some() || self.duration <= 0.0 {
+            return;
+        }
+        let time = telemetry.plan_time_ns as f64 * 1e-9;
+        let left = (self.duration - time).max(0.0);
+        let mode = Mode::from_wire(telemetry.mode).map_or("", Mode::text);
+        let scale = telemetry.speed_scale;
+        self.bar.set_position(((time / self.duration).min(1.0) * STEPS as f64) as u64);
+        self.bar.set_message(match mode {
+            "executing" if scale > 0.01 => format!("{:.0} s left", left / scale),
+            mode => format!("{mode}, {left:.0} s at full speed left"),
+        });
+    }
+}

@@ -1,0 +1,44 @@
+//! The way from a plan's last stop to where it leaves the arm.
+
+use nullsweep_robot::JointVector;
+
+use super::attempt::Planning;
+use super::job::End;
+use crate::motion::{jump, retract};
+use crate::plan::{LIFT, Plan, PlanKnot};
+use crate::timing;
+
+impl Planning<'_> {
+    /// Puts the way from the last stop to where the plan is to end behind a plan with bang-bang
+    /// velocity. Where there is none the plan ends nearer to its last stop, which is told.
+    pub(super) fn leave(&self, plan: &mut Plan) {
+        let Some(last) = plan.knots.last().map(|knot| knot.q) else { return };
+        let goal = match self.job.end {
+            End::Contact => return,
+            End::Lifted => None,
+            End::Start => Some(self.start),
+            End::At(q) => Some(q),
+        };
+        let way = goal.and_then(|goal| jump(self.cell, &last, &goal, self.job.seed));
+        if goal.is_some() && way.is_none() {
+            self.progress.note("no way free of collision to where the plan is to end was found");
+        }
+        let cell = self.cell;
+        let lifted = || retract(cell.world, cell.arm, cell.tool, &last, LIFT);
+        let Some(way) = way.or_else(lifted) else {
+            self.progress.note(
+                "the plan ends on the surface: the tool cannot be lifted off at the last stop",
+            );
+            return;
+        };
+        let free = |q: &JointVector| PlanKnot {
+            time_ns: 0,
+            q: *q,
+            v: JointVector::ZERO,
+            line: None,
+            patch: None,
+        };
+        plan.knots.extend(way[1..].iter().map(free));
+        timing::set_times(&mut plan.knots, &self.velocity);
+    }
+}

@@ -1,0 +1,17 @@
+//! What the command lines of all programs share: the cell file, which says once which robot, tool and
+//! scene are meant, and how a program tells another one what it can be asked for.
+//!
+//! It knows no robot and no planner: a cell is names of files and numbers, which become defaults of
+//! whatever flags a program has. What is given on the command line wins.
+
+mod causes;
+mod defaults;
+mod describe;
+mod file;
+mod parse;
+
+pub use causes::causes;
+pub use defaults::Defaults;
+pub use describe::{DESCRIBE, Described};
+pub use file::{Cell, CellError, FILE_NAME};
+pub use parse::{VARIABLE, parse, parse_alone};

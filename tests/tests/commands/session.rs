@@ -1,0 +1,125 @@
+//! A shell in which all programs of the house are on the PATH, in a copy of the examples.
+
+use std::fs::{self, File};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use tempfile::TempDir;
+
+use crate::blocks::{Block, Mark};
+
+/// Each program, and what it is here: the demo plays planner and executor too.
+const DEMO: &str = env!("CARGO_BIN_EXE_demo");
+const MOCK: &str = env!("CARGO_BIN_EXE_mock-hardware");
+/// A loaded machine may stall a process for longer than a robot would bear.
+const PATIENCE: &str = "--stale-ms 500 --lost-ms 1500 --min-rate 0.01 --spin-us 0";
+
+/// A session.
+pub(crate) struct Session {
+    folder: TempDir,
+}
+
+impl Session {
+    /// A folder of its own with the examples and the programs.
+    pub(crate) fn new(root: &Path) -> Self {
+        let folder = TempDir::with_prefix("nullsweep-commands-").expect("a folder");
+        let (sample, copy) = (root.join("examples/sample"), folder.path().join("examples/sample"));
+        fs::create_dir_all(&copy).expect("a folder");
+        for entry in fs::read_dir(sample).expect("samples") {
+            let entry = entry.expect("an entry");
+            fs::copy(entry.path(), copy.join(entry.file_name())).expect("copied");
+        }
+        // Apart from whatever else runs on this machine.
+        let cell = copy.join("cell.toml");
+        let text = fs::read_to_string(&cell).expect("a cell");
+        fs::write(&cell, format!("ipc_root = \"ipc\"\n{text}")).expect("written");
+        let bin = folder.path().join("bin");
+        fs::create_dir_all(&bin).expect("a folder");
+        let script = |name: &str, text: &str| {
+            let path = bin.join(name);
+            fs::write(&path, format!("#!/bin/sh\n{text}\n")).expect("written");
+            fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a script");
+        };
+        script("planner", &format!("exec {DEMO} __planner \"$@\""));
+        let patient = format!("[ \"$1\" = run ] && set -- \"$@\" {PATIENCE}");
+        script("executor", &format!("{patient}\nexec {DEMO} __executor \"$@\""));
+        script("mock-hardware", &format!("exec {MOCK} --timeout 500 \"$@\""));
+        script(
+            "nullsweep",
+            "case $1 in\nrun|ctl|top|replay) exec executor \"$@\" ;;\n\
+             mock|endpoint) shift; exec mock-hardware \"$@\" ;;\n*) exec planner \"$@\" ;;\nesac",
+        );
+        Self { folder }
+    }
+
+    /// Runs blocks one after another, and asserts that every command goes well.
+    pub(crate) fn run(&self, blocks: &[Block]) {
+        let mut text = String::from("set -eu\n");
+        for block in blocks {
+            let background = matches!(block.mark, Mark::Background(_));
+            for command in block.commands() {
+                text += &format!("echo '$ {command}'\n");
+                text += &if background { format!("{command} &\n") } else { format!("{command}\n") };
+            }
+            if background {
+                text += "for i in $(seq 300); do executor ctl status 2>/dev/null | grep -q hold && \
+                         break; sleep 0.1; done\n";
+            }
+        }
+        text += "kill $(jobs -p) 2>/dev/null || true\nwait\n";
+        let at = self.folder.path();
+        let said = at.join("said");
+        let out = File::create(&said).expect("a file");
+        let path = std::env::var("PATH").unwrap_or_default();
+        let status = Command::new("bash")
+            .args(["-c", &text])
+            .current_dir(at)
+            .env("PATH", format!("{}:{path}", at.join("bin").display()))
+            .env_remove(nullsweep_cell::VARIABLE)
+            .stdin(Stdio::null())
+            .stderr(out.try_clone().expect("a file"))
+            .stdout(out)
+            .status()
+            .expect("a shell");
+        let said = fs::read_to_string(said).expect("output");
+        assert!(status.success(), "{status}:\n{said}");
+        println!("{said}");
+    }
+}
+
+/// The program with its subcommands, and the flags that a command line gives it; `None` where it is no
+/// program of the house.
+pub(crate) fn call(command: &str) -> Option<(Vec<String>, Vec<String>)> {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let words = match words.iter().position(|word| *word == "--bin") {
+        Some(bin) if words.first() == Some(&"cargo") => {
+            let rest = words.iter().position(|word| *word == "--").map_or(words.len(), |i| i + 1);
+            [&words[bin + 1..bin + 2], &words[rest..]].concat()
+        }
+        _ => words,
+    };
+    let (program, rest) = words.split_first()?;
+    let program = match (*program, rest.first()) {
+        ("nullsweep", Some(&("run" | "ctl" | "top" | "replay"))) => "executor",
+        ("nullsweep", Some(&("plan" | "task" | "scene" | "publish" | "goto" | "cell"))) => {
+            "planner"
+        }
+        ("planner" | "executor", _) => program,
+        _ => return None,
+    };
+    let is_name = |word: &&&str| word.chars().all(|c| c.is_ascii_lowercase());
+    let deep = if rest.first().is_some_and(|word| ["cell", "ctl"].contains(word)) { 2 } else { 1 };
+    let below = rest.iter().filter(is_name).take(deep).map(ToString::to_string);
+    let flags = rest.iter().filter(|word| word.starts_with("--"));
+    let flags = flags.map(|flag| flag.split('=').next().unwrap_or_default().to_owned()).collect();
+    Some((std::iter::once(program.to_owned()).chain(below).collect(), flags))
+}
+
+/// What a program says of itself.
+pub(crate) fn help(words: &[String]) -> String {
+    let mut command = Command::new(DEMO);
+    command.arg(format!("__{}", words[0])).args(&words[1..]).arg("--help");
+    let output = command.env(nullsweep_cell::VARIABLE, "").output().expect("it starts");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
