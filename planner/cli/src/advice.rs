@@ -203,7 +203,7 @@ fn posture(error: &PostureError) -> Option<String> {
 
 fn collision(error: &CollisionError) -> Option<String> {
     let folder = |error: &MeshError| match error {
-        MeshError::UnknownPackage { package } => {
+        MeshError::UnknownPackage { package, .. } => {
             Some(format!("--package {package}=FOLDER says where its meshes are"))
         }
         _ => None,
@@ -232,7 +232,11 @@ mod tests {
     fn it_is_found_through_errors_and_contexts_around_the_cause() {
         let mesh = || CollisionError::Mesh {
             link: "hand".into(),
-            error: MeshError::UnknownPackage { package: "gripper".into() },
+            error: MeshError::UnknownPackage {
+                package: "gripper".into(),
+                file: "palm.stl".into(),
+                looked: "nowhere else".into(),
+            },
         };
         for advice in [of(mesh()), of(PipelineError::from(mesh())), of(TaskError::from(mesh()))] {
             assert!(advice.starts_with("--package gripper=FOLDER"), "{advice}");

@@ -7,6 +7,7 @@ use clap::Args;
 use nalgebra::{Isometry3, UnitVector3, Vector3};
 use nullsweep_planner::progress::Progress;
 use nullsweep_surface::room;
+use nullsweep_surface::scan::ScanWarning;
 use nullsweep_surface::{PlacedScan, Placement, RawScan, ReadOptions, scan};
 
 use crate::advice;
@@ -132,14 +133,18 @@ fn together(
     gravity: Gravity,
     bars: &Bars,
 ) -> anyhow::Result<Placement> {
-    let Some((path, first)) = files.first() else { return upright(args) };
+    let Some((path, first)) = files.first() else { return upright(args, None) };
     let placement = match gravity {
         Gravity::Found if args.sensor_height.is_none() => leveled(args, first, seed, bars)?,
         _ => {
-            if args.up.is_none() {
+            let stated = first.warnings.iter().find_map(|warning| match warning {
+                ScanWarning::Upright { up, .. } => UnitVector3::try_new(Vector3::from(*up), 1e-6),
+                _ => None,
+            });
+            if args.up.is_none() && stated.is_none() {
                 bars.note("up is taken to be 0,0,1 in the file's frame: --up says what it is");
             }
-            upright(args)?
+            upright(args, stated)?
         }
     };
     // What is lowest of all files rests on the support.
@@ -187,8 +192,9 @@ fn leveled(args: &PlacedArgs, raw: &RawScan, seed: u64, bars: &Bars) -> anyhow::
     Ok(Placement::Frame { pose, sensor: None })
 }
 
-fn upright(args: &PlacedArgs) -> anyhow::Result<Placement> {
-    let up = up(args)?.unwrap_or(Vector3::z_axis());
+/// Up as it is asked for, else as the file states it, else z.
+fn upright(args: &PlacedArgs, stated: Option<UnitVector3<f64>>) -> anyhow::Result<Placement> {
+    let up = up(args)?.or(stated).unwrap_or(Vector3::z_axis());
     Ok(match args.sensor_height {
         Some(sensor_height) => {
             Placement::UpAndHeight { up, sensor_height, support_height: args.support_height }

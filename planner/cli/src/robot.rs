@@ -101,10 +101,10 @@ impl RobotArgs {
     pub(super) fn collision(&self) -> Options {
         let folder = self.urdf.as_deref().and_then(Path::parent);
         Options {
-            meshes: MeshPaths {
-                packages: self.package.iter().map(|p| (p.0.clone(), p.1.clone())).collect(),
-                relative_to: folder.map(Path::to_path_buf).unwrap_or_default(),
-            },
+            meshes: MeshPaths::of_machine(
+                folder.unwrap_or(Path::new("")),
+                self.package.iter().map(|p| (p.0.clone(), p.1.clone())).collect(),
+            ),
             fit_capsules: self.fit_capsules,
             srdf: self.srdf.clone(),
             ..Options::default()

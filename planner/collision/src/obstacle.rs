@@ -19,8 +19,8 @@ pub struct Obstacle {
 /// The shape of an obstacle about its own origin. \[m\]
 #[derive(Clone, Debug)]
 pub enum ObstacleShape {
-    /// A shape as a URDF describes it. A mesh stands for its convex hull (a concave thing takes one
-    /// file for each convex piece) and is found as those of the links are.
+    /// A shape as a URDF describes it. A mesh is found, and stands for convex pieces, as those of
+    /// the links are.
     Geometry(Geometry),
     /// All that is below the plane z = 0: a floor.
     Floor,

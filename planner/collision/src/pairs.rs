@@ -21,7 +21,8 @@ pub struct Excluded {
     pub first: String,
     /// The other.
     pub second: String,
-    /// Which of the collision shapes of each, in URDF order; none: all of them.
+    /// Which of the collision shapes of each, in URDF order and with the convex pieces of a mesh as
+    /// shapes of their own; none: all of them.
     pub shapes: Option<(usize, usize)>,
     /// Why not.
     pub reason: Reason,

@@ -1,5 +1,6 @@
 //! The collision shapes of a robot: from its URDF, mesh files, fitted capsules and the tool.
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -8,7 +9,7 @@ use parry3d_f64::shape::SharedShape;
 
 use crate::error::CollisionError;
 use crate::options::{Attached, Options};
-use crate::solid::Solid;
+use crate::solid::{Prepared, Solid};
 
 /// One convex shape fixed to a link.
 #[derive(Clone)]
@@ -46,7 +47,7 @@ pub(crate) fn collect(
     tool: &Tool,
     options: &Options,
 ) -> Result<(Vec<Part>, Vec<String>), CollisionError> {
-    let (mut parts, mut notes) = (Vec::new(), Vec::new());
+    let (mut parts, mut notes, mut places) = (Vec::new(), Vec::new(), BTreeSet::new());
     let moving = arm.moving_links();
     for (index, link) in robot.links().iter().enumerate() {
         if link.empty_shapes > 0 {
@@ -59,8 +60,10 @@ pub(crate) fn collect(
         let mut found = Vec::new();
         for shape in &link.collisions {
             match Solid::prepare(&shape.geometry, shape.origin, &options.meshes) {
-                Ok((solid, origin)) => {
-                    found.push(Part::new(Some(index), &link.name, solid, origin));
+                Ok(Prepared { solids, pose, told }) => {
+                    let part = |solid| Part::new(Some(index), &link.name, solid, pose);
+                    found.extend(solids.into_iter().map(part));
+                    places.extend(told);
                 }
                 Err(error) => missing = Some(error),
             }
@@ -97,14 +100,17 @@ pub(crate) fn collect(
         let index = robot.links().iter().position(|l| l.name == *link).ok_or_else(|| {
             CollisionError::UnknownLink { link: link.clone(), named_by: format!("object {name}") }
         })?;
-        let (solid, origin) = Solid::prepare(&shape.geometry, shape.origin, &options.meshes)
-            .map_err(|error| CollisionError::Mesh { link: name.clone(), error })?;
-        parts.push(Part::new(Some(index), name, solid, origin));
+        let Prepared { solids, pose, told } =
+            Solid::prepare(&shape.geometry, shape.origin, &options.meshes)
+                .map_err(|error| CollisionError::Mesh { link: name.clone(), error })?;
+        parts.extend(solids.into_iter().map(|solid| Part::new(Some(index), name, solid, pose)));
+        places.extend(told);
     }
     let half = 0.5 * Vector3::new(tool.width, tool.length, tool.thickness);
     let centre = tool.contact_in_tip() * Isometry3::translation(0.0, 0.0, -half.z);
     let pad = Part::new(None, &tool.name, Solid::Box { half }, centre);
     parts.push(Part { is_pad: true, ..pad });
+    notes.extend(places);
     Ok((parts, notes))
 }
 

@@ -14,7 +14,7 @@ use crate::pairs::{self, Pairs};
 use crate::parts::{self, Part};
 use crate::points::{Points, Sorted};
 use crate::rules::Margins;
-use crate::solid::Solid;
+use crate::solid::{Prepared, Solid};
 
 /// A robot with its tool, scan and obstacles, all shapes prepared; in the root frame.
 pub(crate) struct Scene {
@@ -34,7 +34,8 @@ pub(crate) struct Scene {
     pub(crate) notes: Vec<String>,
 }
 
-/// An obstacle whose shape is read and ready.
+/// An obstacle, or a convex piece of one, whose shape is read and ready.
+#[derive(Clone)]
 pub(crate) struct PreparedObstacle {
     pub(crate) name: String,
     pub(crate) solid: Solid,
@@ -62,8 +63,9 @@ impl Scene {
         let pairs = pairs::find(robot, arm, &bodies, &parts, options)?;
         let obstacles = obstacles
             .iter()
-            .map(|obstacle| PreparedObstacle::new(obstacle, &options.meshes))
-            .collect::<Result<_, _>>()?;
+            .map(|obstacle| PreparedObstacle::all(obstacle, &options.meshes))
+            .collect::<Result<Vec<_>, _>>()?
+            .concat();
         let body_of = |part: &Part| bodies.carrier(part.link).0;
         let scene = Self {
             links: robot.links().len(),
@@ -82,15 +84,23 @@ impl Scene {
 }
 
 impl PreparedObstacle {
-    fn new(obstacle: &Obstacle, meshes: &MeshPaths) -> Result<Self, CollisionError> {
+    /// One for each convex piece of it.
+    fn all(obstacle: &Obstacle, meshes: &MeshPaths) -> Result<Vec<Self>, CollisionError> {
         let Obstacle { name, shape, pose, carries_robot } = obstacle;
-        let (solid, pose) = match shape {
-            ObstacleShape::Floor => (Solid::HalfSpace, *pose),
-            ObstacleShape::Geometry(geometry) => Solid::prepare(geometry, *pose, meshes)
-                .map_err(|error| CollisionError::ObstacleMesh { obstacle: name.clone(), error })?,
+        let (solids, pose) = match shape {
+            ObstacleShape::Floor => (vec![Solid::HalfSpace], *pose),
+            ObstacleShape::Geometry(geometry) => {
+                let error = |error| CollisionError::ObstacleMesh { obstacle: name.clone(), error };
+                let Prepared { solids, pose, .. } =
+                    Solid::prepare(geometry, *pose, meshes).map_err(error)?;
+                (solids, pose)
+            }
         };
-        let shape = solid.to_parry();
-        Ok(Self { name: name.clone(), solid, shape, pose, carries_robot: *carries_robot })
+        let prepared = |solid: Solid| {
+            let (name, carries_robot) = (name.clone(), *carries_robot);
+            Self { name, shape: solid.to_parry(), solid, pose, carries_robot }
+        };
+        Ok(solids.into_iter().map(prepared).collect())
     }
 }
 

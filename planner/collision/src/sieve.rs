@@ -16,6 +16,9 @@ pub(crate) struct Sieve<'a> {
     need: f32,
 }
 
+/// Planes of a hull between two looks whether all points are beyond one of them.
+const PLANES: usize = 6;
+
 impl<'a> Sieve<'a> {
     /// The solid stands at `at`; the points come relative to `origin`, in the same frame. `need`
     /// includes what rounding may take away. \[m\]
@@ -56,10 +59,15 @@ impl<'a> Sieve<'a> {
                 (x * x + y * y + z * z, self.need)
             }
             Solid::Hull(hull) => {
-                let outside = hull.planes().iter().fold(f32x8::ZERO, |most, (n, offset)| {
-                    let [a, b, c] = [n.x as f32, n.y as f32, n.z as f32];
-                    most.fast_max(x * a + y * b + z * c - *offset as f32)
-                });
+                let (need, mut outside) = (f32x8::splat(self.need), f32x8::ZERO);
+                for planes in hull.lanes.chunks(PLANES) {
+                    for [a, b, c, offset] in planes {
+                        outside = outside.fast_max(x * *a + y * *b + z * *c - *offset);
+                    }
+                    if outside.simd_ge(need).all() {
+                        return 0;
+                    }
+                }
                 (outside * outside, self.need)
             }
             Solid::HalfSpace => {
@@ -79,7 +87,7 @@ mod tests {
 
     use super::*;
     use crate::field::Field;
-    use crate::solid::Hull;
+    use crate::mesh::Hull;
 
     #[test]
     fn no_near_point_is_ruled_out_and_most_far_ones_are() {

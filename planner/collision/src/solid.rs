@@ -3,14 +3,14 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use nullsweep_robot::Geometry;
 use parry3d_f64::math::Vec3;
 use parry3d_f64::query::{DefaultQueryDispatcher, PointQuery, QueryDispatcher};
-use parry3d_f64::shape::{ConvexPolyhedron, SharedShape};
+use parry3d_f64::shape::SharedShape;
 
 use crate::frame::Frame;
-use crate::mesh::{MeshError, MeshPaths, read_stl};
+use crate::mesh::{Hull, MeshError, MeshPaths};
 
 /// A convex solid about its own origin; lengths in \[m\].
 #[derive(Clone, Debug)]
@@ -36,76 +36,42 @@ pub(crate) enum Solid {
     HalfSpace,
 }
 
-/// A convex polyhedron with its face planes.
-#[derive(Clone, Debug)]
-pub(crate) struct Hull {
-    shape: ConvexPolyhedron,
-    /// Outward unit normal and offset of each face; every vertex satisfies n·v ≤ offset.
-    planes: Vec<(Vector3<f64>, f64)>,
-    min: Vector3<f64>,
-    max: Vector3<f64>,
-}
-
-impl Hull {
-    /// The convex hull of the points; `None` if they are fewer than four, not finite, or flat.
-    pub(crate) fn new(points: &[Point3<f64>]) -> Option<Self> {
-        if points.len() < 4 || points.iter().any(|p| !p.coords.iter().all(|x| x.is_finite())) {
-            return None;
-        }
-        let vertices: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect();
-        let shape = ConvexPolyhedron::from_convex_hull(&vertices)?;
-        // The faces come from a numeric hull that may shave off a vertex by a rounding error:
-        // offsets are taken over all input points, so that no plane cuts into the solid.
-        let planes = shape
-            .faces()
-            .iter()
-            .map(|face| {
-                let n = Vector3::new(face.normal.x, face.normal.y, face.normal.z);
-                let offset = points.iter().map(|p| n.dot(&p.coords)).fold(f64::MIN, f64::max);
-                (n, offset)
-            })
-            .collect();
-        let (mut min, mut max) = (points[0].coords, points[0].coords);
-        for p in points {
-            min = min.inf(&p.coords);
-            max = max.sup(&p.coords);
-        }
-        Some(Self { shape, planes, min, max })
-    }
-
-    /// Outward unit normal and offset of each face.
-    pub(crate) fn planes(&self) -> &[(Vector3<f64>, f64)] {
-        &self.planes
-    }
+/// A URDF's shape as convex solids, all at one pose.
+pub(crate) struct Prepared {
+    pub(crate) solids: Vec<Solid>,
+    pub(crate) pose: Isometry3<f64>,
+    /// Where its package was found, in words, if that was looked for.
+    pub(crate) told: Option<String>,
 }
 
 impl Solid {
-    /// The solid of a shape that stands at `origin`, and where the solid stands in the same frame:
-    /// a cylinder turns. A mesh is read from its file and becomes its convex hull.
+    /// The solids of a shape that stands at `origin`, and where they stand in the same frame: a
+    /// cylinder turns. A mesh is read from its file and becomes convex pieces.
     pub(crate) fn prepare(
         geometry: &Geometry,
         origin: Isometry3<f64>,
         meshes: &MeshPaths,
-    ) -> Result<(Self, Isometry3<f64>), MeshError> {
-        let solid = match geometry {
-            Geometry::Box { half_extents } => Self::Box { half: *half_extents },
-            Geometry::Sphere { radius } => Self::Ball { radius: *radius },
+    ) -> Result<Prepared, MeshError> {
+        let (mut pose, mut told) = (origin, None);
+        let solids = match geometry {
+            Geometry::Box { half_extents } => vec![Self::Box { half: *half_extents }],
+            Geometry::Sphere { radius } => vec![Self::Ball { radius: *radius }],
             Geometry::Capsule { radius, half_length } => {
-                Self::Capsule { half: *half_length, radius: *radius }
+                vec![Self::Capsule { half: *half_length, radius: *radius }]
             }
             Geometry::Cylinder { radius, half_length } => {
                 let quarter = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2);
-                let solid = Self::Cylinder { half: *half_length, radius: *radius };
-                return Ok((solid, origin * quarter));
+                pose = origin * quarter;
+                vec![Self::Cylinder { half: *half_length, radius: *radius }]
             }
             Geometry::Mesh { uri, scale } => {
-                let path = meshes.resolve(uri)?;
-                let points = read_stl(&path, scale)?;
-                let flat = || MeshError::Flat { path, vertices: points.len() };
-                Self::Hull(Box::new(Hull::new(&points).ok_or_else(flat)?))
+                let found = meshes.resolve(uri)?;
+                let hulls = meshes.hulls(&found, scale)?;
+                told = found.told;
+                hulls.iter().map(|hull| Self::Hull(Box::new(hull.clone()))).collect()
             }
         };
-        Ok((solid, origin))
+        Ok(Prepared { solids, pose, told })
     }
 
     /// A lower bound of the signed distance \[m\] from `p` to the solid (negative inside). Exact for
@@ -210,9 +176,7 @@ impl Solid {
             Self::Box { half } => half.norm(),
             Self::Hull(hull) => {
                 let centre = 0.5 * (hull.min + hull.max);
-                let farthest =
-                    |r: f64, v: &Vec3| r.max((Vector3::new(v.x, v.y, v.z) - centre).norm());
-                hull.shape.points().iter().fold(0.0, farthest) + 1e-9
+                hull.corners().fold(0.0, |r: f64, v| r.max((v - centre).norm())) + 1e-9
             }
             Self::HalfSpace => f64::INFINITY,
         }

@@ -116,7 +116,7 @@ fn meshes_fast_check_agrees_with_exact() {
     assert_eq!(fitted.notes().len(), 6, "{:?}", fitted.notes());
 
     options.fit_capsules = None;
-    options.meshes.packages.insert("blobs".into(), folder.path().into());
+    options.meshes = MeshPaths::of_packages([("blobs".into(), folder.path().into())].into());
     let block = folder.path().join("block.stl");
     write_blob(&block, Vector3::new(0.2, 0.3, 0.1), Vector3::new(-0.6, 0.0, 0.6), 77);
     let obstacle = Obstacle {

@@ -19,7 +19,7 @@ pub enum ScanError {
         source: std::io::Error,
     },
     /// The file's name and its first bytes match no supported format.
-    #[error("{}: neither PCD, PLY, STL, OBJ, XYZ nor CSV by its extension or first bytes", path.display())]
+    #[error("{}: neither PCD, PLY, STL, OBJ, glTF, LAS, E57, PTX, NPY, XYZ nor CSV by its extension or first bytes", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -108,6 +108,8 @@ pub enum Place {
     Line(usize),
     /// A byte, counted from 0.
     Byte(usize),
+    /// Somewhere: the library that reads the format does not say where.
+    File,
 }
 
 impl fmt::Display for Place {
@@ -115,6 +117,7 @@ impl fmt::Display for Place {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
             Self::Byte(byte) => write!(f, "byte {byte}"),
+            Self::File => write!(f, "the file"),
         }
     }
 }

@@ -10,44 +10,13 @@ struct Foreign {
     convert: &'static str,
 }
 
-const FOREIGN: [Foreign; 9] = [
-    Foreign {
-        name: "LAS/LAZ",
-        extensions: &["las", "laz"],
-        begins: b"LASF",
-        convert: "pdal translate FILE out.ply",
-    },
-    Foreign {
-        name: "E57",
-        extensions: &["e57"],
-        begins: b"ASTM-E57",
-        convert: "pdal translate FILE out.ply",
-    },
-    Foreign {
-        name: "glTF",
-        extensions: &["gltf", "glb"],
-        begins: b"glTF",
-        convert: "assimp export FILE out.ply",
-    },
+const FOREIGN: [Foreign; 4] = [
     Foreign {
         name: "3MF",
         extensions: &["3mf"],
         // It is a zip file, as much else is.
         begins: b"",
         convert: "assimp export FILE out.stl",
-    },
-    Foreign {
-        name: "NumPy",
-        extensions: &["npy"],
-        begins: b"\x93NUMPY",
-        convert: "python3 -c \"import numpy as n; a = n.load('FILE'); \
-                  n.savetxt('out.xyz', a.reshape(-1, a.shape[-1])[:, :3])\"",
-    },
-    Foreign {
-        name: "PTX",
-        extensions: &["ptx"],
-        begins: b"",
-        convert: "CloudCompare -SILENT -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS",
     },
     Foreign {
         name: "DAE, FBX or 3DS mesh",

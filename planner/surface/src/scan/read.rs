@@ -9,7 +9,9 @@ use super::error::{Malformed, ScanError};
 use super::parsed::Parsed;
 use super::raw::RawScan;
 use super::warning::ScanWarning;
-use super::{decode, foreign, inside, mesh, pcd, ply, sample, stray, text, winding};
+use super::{
+    decode, e57, foreign, gltf, inside, las, mesh, npy, pcd, ply, ptx, sample, stray, text, winding,
+};
 
 /// How to read a scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,9 +41,27 @@ pub enum Format {
     Stl,
     /// Wavefront mesh or points.
     Obj,
+    /// Meshes in a tree of nodes: text with buffers, or binary.
+    Gltf,
+    /// A lidar's points, plain or compressed.
+    Las,
+    /// A terrestrial scanner's scans with their poses, binary.
+    E57,
+    /// The same as text.
+    Ptx,
+    /// A NumPy array.
+    Npy,
     /// A point a line: numbers apart by blanks, tabs, commas or semicolons, columns named or not.
     Text,
 }
+
+/// How binary files begin.
+const MAGIC: [(&[u8], Format); 4] = [
+    (b"glTF", Format::Gltf),
+    (b"LASF", Format::Las),
+    (b"ASTM-E57", Format::E57),
+    (b"\x93NUMPY", Format::Npy),
+];
 
 impl Format {
     /// The format of a file by its name, or by how its content starts.
@@ -53,6 +73,11 @@ impl Format {
             Some("ply") => Some(Self::Ply),
             Some("stl") => Some(Self::Stl),
             Some("obj") => Some(Self::Obj),
+            Some("gltf" | "glb") => Some(Self::Gltf),
+            Some("las" | "laz") => Some(Self::Las),
+            Some("e57") => Some(Self::E57),
+            Some("ptx") => Some(Self::Ptx),
+            Some("npy") => Some(Self::Npy),
             Some("xyz" | "csv" | "txt" | "asc" | "pts") => Some(Self::Text),
             _ => {
                 let head = decode::without_bom(bytes);
@@ -61,7 +86,10 @@ impl Format {
                 } else if head.starts_with(b"# .PCD") || head.starts_with(b"VERSION") {
                     Some(Self::Pcd)
                 } else {
-                    None
+                    let begins = |(magic, format): &(&[u8], Self)| {
+                        bytes.starts_with(magic).then_some(*format)
+                    };
+                    MAGIC.iter().find_map(begins)
                 }
             }
         }
@@ -87,7 +115,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawScan, ScanError> {
     read_bytes(&bytes, format, path, options)
 }
 
-/// Reads a scan from bytes in memory; `path` is only used to name the scan in errors.
+/// Reads a scan from bytes in memory; `path` names the scan in errors, and what a glTF file keeps in
+/// other files lies beside it.
 ///
 /// # Errors
 /// As [`read`].
@@ -102,6 +131,11 @@ pub fn read_bytes(
         Format::Ply => ply::parse(bytes),
         Format::Stl => mesh::parse_stl(bytes),
         Format::Obj => mesh::parse_obj(bytes),
+        Format::Gltf => gltf::parse(bytes, path),
+        Format::Las => las::parse(bytes),
+        Format::E57 => e57::parse(bytes),
+        Format::Ptx => ptx::parse(bytes),
+        Format::Npy => npy::parse(bytes),
         Format::Text => text::parse(bytes),
     };
     let parsed = parsed.map_err(|Malformed { place, cause }| ScanError::Malformed {

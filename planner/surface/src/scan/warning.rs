@@ -122,6 +122,18 @@ pub enum ScanWarning {
         /// Of how many.
         of: usize,
     },
+    /// The format says which way is up in its files.
+    Upright {
+        /// The format.
+        format: &'static str,
+        /// The direction, in the file's frame.
+        up: [f64; 3],
+    },
+    /// What the format means by its numbers, and what was made of it.
+    Convention {
+        /// In words.
+        told: String,
+    },
     /// Which side of a mesh is its outside cannot be told from its shape.
     SideUnknown {
         /// How many faces were left as the file has them.
@@ -226,6 +238,10 @@ impl fmt::Display for ScanWarning {
             Self::FacesTurned { faces, of } => {
                 write!(f, "{faces} of {of} faces looked inwards and were turned round")
             }
+            Self::Upright { format, up: [x, y, z] } => {
+                write!(f, "{format} files are in metres and have {x},{y},{z} up")
+            }
+            Self::Convention { told } => write!(f, "{told}"),
             Self::SideUnknown { faces, of } => write!(
                 f,
                 "which side is outside cannot be told from the shape for {faces} of {of} faces: left \

@@ -1,0 +1,117 @@
+//! LAS and LAZ: points of a lidar, mostly at the coordinates of a map.
+
+use std::io::Cursor;
+
+use las::Reader;
+use nalgebra::Point3;
+
+use super::error::{Malformed, Place, malformed};
+use super::parsed::Parsed;
+use super::warning::ScanWarning;
+
+/// Points that are read at a time: no more is set aside than a file may hold.
+const BLOCK: u64 = 1 << 16;
+/// Coordinates beyond this are a map's. \[m\]
+const MAP: f64 = 1e4;
+
+/// Reads the points, offset and scale applied.
+pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
+    let wrong = |error: las::Error| Malformed { place: Place::File, cause: error.to_string() };
+    check_chunks(bytes)?;
+    let mut file = Reader::new(Cursor::new(bytes.to_vec())).map_err(wrong)?;
+    let mut parsed = Parsed::default();
+    loop {
+        let block = file.read_points(BLOCK).map_err(wrong)?;
+        if block.is_empty() {
+            break;
+        }
+        let points = block.x().zip(block.y()).zip(block.z());
+        parsed.points.extend(points.map(|((x, y), z)| Point3::new(x, y, z)));
+    }
+    let far = |p: &Point3<f64>| p.coords.amax() > MAP;
+    if let Some(p) = parsed.points.first().filter(|p| far(p)) {
+        parsed.warnings.push(ScanWarning::Convention {
+            told: format!(
+                "the coordinates are a map's, at {:.0}, {:.0}, {:.0} m, and taken for metres: places \
+                 on the floor, as the robot's base, count from the map's origin",
+                p.x, p.y, p.z
+            ),
+        });
+    }
+    Ok(parsed)
+}
+
+/// A LAZ file's table of chunks is made for as many as it announces: not more than there are bytes.
+fn check_chunks(bytes: &[u8]) -> Result<(), Malformed> {
+    let number = |at: usize, size: usize| {
+        let bytes = bytes.get(at..at.checked_add(size)?)?;
+        Some(bytes.iter().rev().fold(0u64, |n, byte| n << 8 | u64::from(*byte)))
+    };
+    let is_laz = number(104, 1).is_some_and(|format| format & 0xC0 != 0);
+    if !is_laz {
+        return Ok(());
+    }
+    let points = number(96, 4).and_then(|at| usize::try_from(at).ok());
+    let table = points.and_then(|at| number(at, 8)).and_then(|at| usize::try_from(at).ok());
+    let chunks = table.and_then(|at| number(at.checked_add(4)?, 4));
+    match chunks {
+        Some(chunks) if chunks <= bytes.len() as u64 => Ok(()),
+        Some(chunks) => {
+            malformed(Place::File, format!("{chunks} chunks in a file of {} bytes", bytes.len()))
+        }
+        None => malformed(Place::File, "the table of its chunks lies beyond its end"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use las::point::Format;
+    use las::{Builder, Header, Point, Writer};
+
+    use super::*;
+
+    fn file(compressed: bool, offset: f64) -> Vec<u8> {
+        let mut builder = Builder::from((1, 2));
+        let mut format = Format::new(0).unwrap();
+        format.is_compressed = compressed;
+        builder.point_format = format;
+        builder.transforms.x.offset = offset;
+        let header: Header = builder.into_header().unwrap();
+        let mut writer = Writer::new(Cursor::new(Vec::new()), header).unwrap();
+        for i in 0..200 {
+            let (x, y) = (offset + 0.01 * f64::from(i % 20), 0.01 * f64::from(i / 20));
+            writer.write_point(Point { x, y, z: 0.5, ..Point::default() }).unwrap();
+        }
+        writer.close().unwrap();
+        writer.into_inner().unwrap().into_inner()
+    }
+
+    #[test]
+    fn las_and_laz_hold_the_same_points() {
+        let plain = parse(&file(false, 0.0)).unwrap();
+        assert_eq!(plain.points.len(), 200);
+        assert!((plain.points[21] - Point3::new(0.01, 0.01, 0.5)).norm() < 1e-3);
+        assert_eq!(plain.warnings, []);
+        let packed = parse(&file(true, 0.0)).unwrap();
+        assert_eq!(packed.points, plain.points);
+        let map = parse(&file(false, 4.5e5)).unwrap();
+        assert!(map.warnings[0].to_string().contains("450000"), "{:?}", map.warnings);
+    }
+
+    #[test]
+    fn broken_files_are_refused_without_a_panic() {
+        for compressed in [false, true] {
+            let whole = file(compressed, 0.0);
+            for cut in (0..whole.len()).step_by(7) {
+                assert!(parse(&whole[..cut]).is_err(), "{cut} of {} bytes", whole.len());
+            }
+            for at in 0..whole.len() {
+                for value in [0x00, 0x7F, 0xFF] {
+                    let mut bytes = whole.clone();
+                    bytes[at] = value;
+                    let _ = parse(&bytes);
+                }
+            }
+        }
+    }
+}
