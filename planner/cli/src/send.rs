@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use nullsweep_collision::Margins;
 use nullsweep_ipc_types::{Mode, PlanEvent, Reason, Telemetry};
 use nullsweep_planner::link::Site;
 use nullsweep_planner::link::posture::{Posture, posture, unit};
@@ -81,6 +82,14 @@ pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> 
                 line(if i == 0 { "starts" } else { "" }, &format!("away: {far}"));
             }),
         }
+    }
+    // The margins are no choice of the command line.
+    let kept = 1e3 * Margins::default().environment;
+    match plan.check_seal() {
+        Ok(()) => {
+            line("verified", &format!("{kept:.0} mm kept clear, but for the tool on the surface"))
+        }
+        Err(why) => line("warning", &why.to_string()),
     }
     line("takes", &format!("{:.1} s at full speed", plan.duration()));
     if let Some([reachable, all]) = arm.and_then(|arm| swept(plan, arm)) {
