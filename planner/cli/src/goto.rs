@@ -11,7 +11,7 @@ use nullsweep_robot::{JointVector, Tool};
 
 use crate::bars::Bars;
 use crate::exit::{OK, Usage, VIOLATIONS};
-use crate::numbers::{Held, Numbers};
+use crate::numbers::{Held, Place};
 use crate::output::writable;
 use crate::posture_arg::PostureArg;
 use crate::robot::{RobotArgs, tool_file};
@@ -32,7 +32,7 @@ pub(super) struct GotoArgs {
     plan: Option<PathBuf>,
     /// Where the robot stands in the floor frame, without a plan: x,y,yaw.
     #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true)]
-    base: Option<Numbers<3>>,
+    base: Option<Place>,
     /// Height of the PR2's torso joint, without a plan. [m]
     #[arg(long, value_name = "M", value_parser = crate::numbers::finite)]
     torso: Option<f64>,
@@ -122,7 +122,7 @@ impl GotoArgs {
         let torso = self.torso.map(|height| ("torso_lift_joint".to_owned(), height));
         let held = torso.into_iter().chain(self.held.iter().map(|h| (h.0.clone(), h.1))).collect();
         let base = match self.base {
-            Some(Numbers(base)) => base,
+            Some(Place(base)) => base,
             None if scans.is_empty() && !self.way.has_demo() => [0.0; 3],
             None => {
                 let say = "where does the robot stand? Give --base x,y,yaw, or --plan PLAN for where \

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use nullsweep_planner::cost::{Effort, of_path};
 use nullsweep_planner::plan::Plan;
+use nullsweep_planner::workcell::stance::told;
 use nullsweep_robot::MAX_DOF;
 use serde::Serialize;
 
 use crate::exit::OK;
 use crate::json::write_json;
-use crate::numbers::place;
 use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
@@ -96,7 +96,7 @@ fn summarise(plan: &Plan) -> Summary {
 fn tables(s: &Summary) -> String {
     let mut plan = sheet(["plan", ""]);
     plan.add_row(["robot", &format!("{} ({})", s.robot, s.fingerprint)]);
-    plan.add_row(["base x, y, yaw", &place(&s.base)]);
+    plan.add_row(["base x, y, yaw", &told(&s.base)]);
     plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
     plan.add_row(["verified", s.unverified_because.as_deref().map_or("yes", |why| why)]);
     plan.add_row(["knots (on the surface)", &format!("{} ({})", s.knots, s.knots_on_surface)]);

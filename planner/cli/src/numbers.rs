@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use nullsweep_robot::wrap;
 
 /// Any finite number.
 pub(super) fn finite(text: &str) -> Result<f64, String> {
@@ -81,13 +80,33 @@ pub(super) fn percent(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)
 }
 
-/// A place on the floor for people: metres, and degrees within ±180.
-pub(super) fn place(&[x, y, yaw]: &[f64; 3]) -> String {
-    format!("{x:.3} m, {y:.3} m, {:.1}°", wrap(yaw).to_degrees())
+/// A place on the floor: x, y \[m\] and yaw \[rad\], or in degrees with `°` or `deg` behind it, as it is
+/// told to people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place(pub(super) [f64; 3]);
+
+impl FromStr for Place {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let degrees = ["°", "deg"].iter().find_map(|unit| text.trim_end().strip_suffix(unit));
+        let metres = degrees.unwrap_or(text).replace(" m,", ",");
+        let Numbers([x, y, yaw]) = metres.parse()?;
+        Ok(Self([x, y, if degrees.is_some() { yaw.to_radians() } else { yaw }]))
+    }
 }
 
 #[test]
-fn a_yaw_is_told_within_half_a_turn() {
-    assert_eq!(place(&[1.0, -0.5, 1.5 * std::f64::consts::PI]), "1.000 m, -0.500 m, -90.0°");
+fn a_yaw_is_told_within_half_a_turn_and_read_as_it_is_told() {
+    let place = [1.0, -0.5, 1.5 * std::f64::consts::PI];
+    let told = nullsweep_planner::workcell::stance::told(&place);
+    assert_eq!(told, "1.000 m, -0.500 m, -90.0°");
+    let Place([x, y, yaw]) = told.parse().expect("a place");
+    assert!((x, y) == (1.0, -0.5) && (yaw + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    assert_eq!("1,2,-0.5".parse(), Ok(Place([1.0, 2.0, -0.5])));
+    assert_eq!("1,2,180deg".parse(), Ok(Place([1.0, 2.0, std::f64::consts::PI])));
+    for wrong in ["1,2", "1,2,°", "1,2,inf", "1,2,3,4"] {
+        wrong.parse::<Place>().expect_err(wrong);
+    }
     assert_eq!(percent(0.9871), "98.71 %");
 }

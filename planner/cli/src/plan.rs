@@ -14,7 +14,7 @@ use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
-use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
+use nullsweep_planner::workcell::stance::{Stance, StanceSearch, told};
 use nullsweep_report as report;
 use nullsweep_robot::{Robot, Tool};
 use nullsweep_surface::PatchConfig;
@@ -23,7 +23,7 @@ use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg};
 use crate::exit::OK;
 use crate::json::write_json;
-use crate::numbers::{Held, Numbers, finite, not_negative, percent, place, positive, velocity};
+use crate::numbers::{Held, Place, finite, not_negative, percent, positive, velocity};
 use crate::output::writable;
 use crate::picture::{Sitter, picture};
 use crate::posture_arg::PostureArg;
@@ -50,7 +50,8 @@ pub(super) struct PlanArgs {
     /// The tool, a TOML file; without it a sponge of 0.10 × 0.07 m.
     #[arg(long, value_name = "FILE")]
     tool: Option<PathBuf>,
-    /// Where the robot stands in the floor frame: x,y,yaw, or `auto`: where it reaches most.
+    /// Where the robot stands in the floor frame: x,y,yaw (in radians, or degrees with
+    /// ° or deg behind them), or `auto`: where it reaches most.
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     base: Base,
     /// Height of the PR2's torso joint, with a given base. [m]
@@ -138,7 +139,7 @@ impl FromStr for Base {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "auto" { Ok(Self::Auto) } else { Ok(Self::At(Numbers::from_str(text)?.0)) }
+        if text == "auto" { Ok(Self::Auto) } else { Ok(Self::At(Place::from_str(text)?.0)) }
     }
 }
 
@@ -318,7 +319,7 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
     row("fill-in patches", f.fill_in_patches.to_string());
     row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
-    row("base x, y, yaw", place(&f.base));
+    row("base x, y, yaw", told(&f.base));
     for (name, position) in &f.held {
         row(name, format!("{position:.3}"));
     }

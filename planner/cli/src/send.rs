@@ -7,10 +7,13 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use nullsweep_collision::Margins;
 use nullsweep_ipc_types::{Mode, PlanEvent, Reason, Telemetry};
 use nullsweep_planner::link::Site;
 use nullsweep_planner::link::posture::{Posture, posture, unit};
-use nullsweep_planner::link::publish::{Join, Patience, PublishError, Watcher, describe, publish};
+use nullsweep_planner::link::publish::{
+    Join, Patience, PublishError, Watcher, describe_for, publish,
+};
 use nullsweep_planner::plan::{Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::Arm;
@@ -31,6 +34,8 @@ pub(super) struct SendArgs {
 /// only told.
 pub(super) const LISTEN: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_secs(1);
+/// What an executor bridges by itself unless it is told otherwise. \[rad\] or \[m\]
+const BRIDGED: f64 = 0.02;
 /// A way to a plan's start that is worth a word. \[rad\] or \[m\]
 const WORTH: f64 = 0.001;
 
@@ -81,6 +86,17 @@ pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> 
                 line(if i == 0 { "starts" } else { "" }, &format!("away: {far}"));
             }),
         }
+        if !apart(plan, arm, now, BRIDGED).is_empty() {
+            line("", "farther than an executor goes by itself: --goto brings it there");
+        }
+    }
+    // The margins are no choice of the command line.
+    let kept = 1e3 * Margins::default().environment;
+    match plan.check_seal() {
+        Ok(()) => {
+            line("verified", &format!("{kept:.0} mm kept clear, but for the tool on the surface"))
+        }
+        Err(why) => line("warning", &why.to_string()),
     }
     line("takes", &format!("{:.1} s at full speed", plan.duration()));
     if let Some([reachable, all]) = arm.and_then(|arm| swept(plan, arm)) {
@@ -159,6 +175,7 @@ const STEPS: u64 = 1000;
 struct Show {
     bar: ProgressBar,
     duration: f64,
+    joints: Vec<String>,
 }
 
 impl Show {
@@ -167,13 +184,13 @@ impl Show {
         if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
-        Self { bar, duration: plan.duration() }
+        Self { bar, duration: plan.duration(), joints: plan.joints.clone() }
     }
 }
 
 impl Watcher for Show {
     fn event(&mut self, event: &PlanEvent) {
-        self.bar.suspend(|| println!("{}", describe(event)));
+        self.bar.suspend(|| println!("{}", describe_for(event, &self.joints)));
     }
 
     fn progress(&mut self, telemetry: &Telemetry) {

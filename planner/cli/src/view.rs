@@ -124,11 +124,11 @@ fn table(found: &Verification) -> Table {
 
 /// The arm that the plan is for, its held joints where the plan holds them.
 fn arm(args: &ViewArgs, robot: &Robot, plan: &Plan) -> anyhow::Result<Arm> {
-    let arm = robot.arm(&args.robot.spec()?)?;
+    let arm = robot.arm(&args.robot.spec())?;
     if plan.fingerprint != arm.fingerprint() || plan.joints != arm.joint_names() {
         bail!(
             "the plan moves {} of {}, the arm given is {} of {}: say which one by --urdf and \
-             --chain, or --arm left",
+             --arm BASE,TIP, or left",
             plan.joints.join(", "),
             plan.robot,
             arm.joint_names().join(", "),

@@ -70,6 +70,16 @@ pub struct Triangles {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Triangles {
+    /// Two surfaces as one.
+    fn and(mut self, other: Self) -> Self {
+        let first = self.vertices.len() as u32;
+        self.vertices.extend(other.vertices);
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|corner| corner + first)));
+        self
+    }
+}
+
 /// Into how many pieces a circle is cut.
 const PIECES: u32 = 28;
 
@@ -124,7 +134,10 @@ impl Obstacle {
         match &self.shape {
             ObstacleShape::Floor => Ok(Triangles::default()),
             ObstacleShape::Geometry(geometry) => Solid::prepare(geometry, self.pose, meshes)
-                .map(|(solid, pose)| triangles(&solid, &pose))
+                .map(|found| {
+                    let pieces = found.solids.iter().map(|solid| triangles(solid, &found.pose));
+                    pieces.fold(Triangles::default(), Triangles::and)
+                })
                 .map_err(|error| CollisionError::ObstacleMesh {
                     obstacle: self.name.clone(),
                     error,

@@ -41,6 +41,9 @@ pub(crate) enum Command {
     /// Check a plan file against its scene.
     #[command(disable_help_flag = true)]
     Verify(Rest),
+    /// Show plans, scans, scenes and recordings on one page.
+    #[command(disable_help_flag = true)]
+    View(Rest),
     /// Say what a plan file holds.
     #[command(disable_help_flag = true)]
     Inspect(Rest),

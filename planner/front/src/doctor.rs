@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
+use std::time::Duration;
 
 use rustix::process::{Resource, getrlimit};
 
@@ -149,6 +150,15 @@ fn shared_memory(folder: &Path) -> Finding {
     Finding::good("shared memory", found)
 }
 
+/// How long a process may take to fill a file that it has made.
+const STARTING: Duration = Duration::from_secs(10);
+
+/// Whether a file was left empty.
+fn is_left(file: &fs::Metadata) -> bool {
+    let age = file.modified().ok().and_then(|at| at.elapsed().ok()).unwrap_or_default();
+    file.is_file() && file.len() == 0 && age >= STARTING
+}
+
 /// Files of iceoryx2's that are empty: a process that died while it started leaves them, and others wait
 /// for them.
 fn leftovers(folder: &Path) -> Finding {
@@ -158,8 +168,8 @@ fn leftovers(folder: &Path) -> Finding {
     let (mut all, mut empty) = (0, Vec::new());
     for entry in ours {
         all += 1;
-        if entry.metadata().is_ok_and(|m| m.is_file() && m.len() == 0) {
-            empty.push(entry.path().display().to_string());
+        if entry.metadata().is_ok_and(|m| is_left(&m)) {
+            empty.push(entry.file_name().to_string_lossy().into_owned());
         }
     }
     if empty.is_empty() {
@@ -168,9 +178,17 @@ fn leftovers(folder: &Path) -> Finding {
             format!("{all} files in {}, none empty", folder.display()),
         );
     }
-    let found =
-        format!("{} of {all} files are empty: a process died while it started", empty.len());
-    Finding::poor("iceoryx2", found, format!("when no program runs: rm {}", empty.join(" ")))
+    empty.sort();
+    let (count, first) = (empty.len(), &empty[0]);
+    Finding::poor(
+        "iceoryx2",
+        format!("{count} of {all} files are empty, a process died while it started: {first}"),
+        format!(
+            "when no program runs: find {} -maxdepth 1 '(' -name 'iox2_*' -o -name 'nsw_*' ')' -empty \
+             -delete",
+            folder.display()
+        ),
+    )
 }
 
 /// The version of each program beside this one.
@@ -235,8 +253,12 @@ mod tests {
         file("iox2_a", "sound");
         file("other", "");
         assert!(!is_poor(&leftovers(folder.path())));
-        file("iox2_b", "");
+        file("nsw_b", "");
+        assert!(!is_poor(&leftovers(folder.path())), "it may be about to be filled");
+        let old = std::time::SystemTime::now() - 2 * STARTING;
+        let made = fs::File::options().append(true).open(folder.path().join("nsw_b"));
+        made.expect("a file").set_modified(old).expect("a time");
         let found = leftovers(folder.path());
-        assert!(found.mend.expect("advice").contains("iox2_b"), "{}", found.found);
+        assert!(is_poor(&found) && found.found.contains("nsw_b"), "{found:?}");
     }
 }

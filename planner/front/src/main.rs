@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Task(rest) => start(PLANNER, Some("task"), rest.args),
         Command::Scene(rest) => start(PLANNER, Some("scene"), rest.args),
         Command::Verify(rest) => start(PLANNER, Some("verify"), rest.args),
+        Command::View(rest) => start(PLANNER, Some("view"), rest.args),
         Command::Inspect(rest) => start(PLANNER, Some("inspect"), rest.args),
         Command::Export(rest) => start(PLANNER, Some("export"), rest.args),
         Command::Cell(rest) => start(PLANNER, Some("cell"), rest.args),

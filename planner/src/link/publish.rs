@@ -182,6 +182,12 @@ pub fn newest_telemetry(ipc: &Ipc, patience: Duration) -> Result<Telemetry, Publ
 /// An event in words, with the joint, knot, value and bound that it names.
 #[must_use]
 pub fn describe(event: &PlanEvent) -> String {
+    describe_for(event, &[])
+}
+
+/// The same, its joint by its name among the plan's.
+#[must_use]
+pub fn describe_for(event: &PlanEvent, joints: &[String]) -> String {
     let kind = EventKind::from_wire(event.kind).map_or("unknown event", EventKind::text);
     let mut text = format!("plan {} {kind}", event.plan);
     if let Some(reason) = Reason::from_wire(event.reason).filter(|r| *r != Reason::None) {
@@ -191,7 +197,10 @@ pub fn describe(event: &PlanEvent) -> String {
         text += &format!(", knot {}", event.knot);
     }
     if event.joint != u32::MAX {
-        text += &format!(", joint {}", event.joint);
+        match joints.get(event.joint as usize) {
+            Some(name) => text += &format!(", {name}"),
+            None => text += &format!(", joint {}", event.joint),
+        }
     }
     if event.kind == EventKind::Accepted.wire() {
         if event.value.is_finite() {

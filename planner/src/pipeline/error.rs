@@ -6,6 +6,7 @@ use nullsweep_robot::ArmError;
 use crate::plan::PlanError;
 use crate::tour::formulation::FormulationError;
 use crate::verify::VerifyError;
+use crate::workcell::stance::told;
 
 /// Why there is no plan.
 #[derive(Debug, thiserror::Error)]
@@ -70,7 +71,7 @@ pub enum PipelineError {
         high: f64,
     },
     /// No patch can be reached.
-    #[error("none of the {patches} patches can be reached from base {base:?}: {why}")]
+    #[error("none of the {patches} patches can be reached from base {}: {why}", told(.base))]
     NothingReached {
         /// How many patches.
         patches: usize,

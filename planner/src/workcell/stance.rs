@@ -39,6 +39,12 @@ impl Stance {
     }
 }
 
+/// A place on the floor for people: metres, and a yaw in degrees within ±180.
+#[must_use]
+pub fn told(&[x, y, yaw]: &[f64; 3]) -> String {
+    format!("{x:.3} m, {y:.3} m, {:.1}°", wrap(yaw).to_degrees())
+}
+
 /// What the search for a stance tries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StanceSearch {

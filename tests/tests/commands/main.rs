@@ -66,6 +66,19 @@ fn every_flag_that_a_document_names_is_taken() {
 }
 
 #[test]
+fn the_front_knows_every_command_of_planner_and_executor() {
+    let front = fs::read_to_string(root().join("planner/front/src/main.rs")).expect("a source");
+    for (program, name) in [("planner", "PLANNER"), ("executor", "EXECUTOR")] {
+        let commands = session::commands(program);
+        assert!(commands.len() > 3, "{commands:?}");
+        for command in commands {
+            let start = format!("start({name}, Some(\"{command}\"), rest.args)");
+            assert!(front.contains(&start), "nullsweep has no {command}");
+        }
+    }
+}
+
+#[test]
 fn the_commands_run_as_they_are_written() {
     let mut sessions: BTreeMap<(PathBuf, String), Vec<Block>> = BTreeMap::new();
     for (path, block) in all() {

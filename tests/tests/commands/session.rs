@@ -5,6 +5,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use nullsweep_cell::{DESCRIBE, Described};
 use tempfile::TempDir;
 
 use crate::blocks::{Block, Mark};
@@ -14,6 +15,21 @@ const DEMO: &str = env!("CARGO_BIN_EXE_demo");
 const MOCK: &str = env!("CARGO_BIN_EXE_mock-hardware");
 /// A loaded machine may stall a process for longer than a robot would bear.
 const PATIENCE: &str = "--stale-ms 500 --lost-ms 1500 --min-rate 0.01 --spin-us 0";
+
+/// Commands of the front that are neither planner's nor executor's.
+const OTHERS: [&str; 11] = [
+    "mock",
+    "endpoint",
+    "demo",
+    "conformance",
+    "latency",
+    "kills",
+    "soak",
+    "doctor",
+    "completions",
+    "man",
+    "help",
+];
 
 /// A session.
 pub(crate) struct Session {
@@ -102,9 +118,7 @@ pub(crate) fn call(command: &str) -> Option<(Vec<String>, Vec<String>)> {
     let (program, rest) = words.split_first()?;
     let program = match (*program, rest.first()) {
         ("nullsweep", Some(&("run" | "ctl" | "top" | "replay"))) => "executor",
-        ("nullsweep", Some(&("plan" | "task" | "scene" | "publish" | "goto" | "cell"))) => {
-            "planner"
-        }
+        ("nullsweep", Some(command)) if !OTHERS.contains(command) => "planner",
         ("planner" | "executor", _) => program,
         _ => return None,
     };
@@ -114,6 +128,14 @@ pub(crate) fn call(command: &str) -> Option<(Vec<String>, Vec<String>)> {
     let flags = rest.iter().filter(|word| word.starts_with("--"));
     let flags = flags.map(|flag| flag.split('=').next().unwrap_or_default().to_owned()).collect();
     Some((std::iter::once(program.to_owned()).chain(below).collect(), flags))
+}
+
+/// The commands of a program, by what it tells of itself.
+pub(crate) fn commands(program: &str) -> Vec<String> {
+    let output = Command::new(DEMO).args([&format!("__{program}"), DESCRIBE]).output();
+    let text = String::from_utf8(output.expect("it starts").stdout).expect("text");
+    let told = Described::from_json(&text).expect("a description");
+    told.below().iter().map(|below| below.name().to_owned()).collect()
 }
 
 /// What a program says of itself.
