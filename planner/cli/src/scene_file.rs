@@ -143,3 +143,52 @@ impl SceneFile {
         Ok(Placed { scan: joined, poses, seed: Some(file.seed) })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::bars::Bars;
+    use crate::placed::{Gravity, read_scans};
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        placed: PlacedArgs,
+    }
+
+    #[test]
+    fn a_scene_file_gives_the_scans_as_they_were_and_says_where_one_was_changed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scan = folder.path().join("floor.xyz");
+        let row = |i: usize| format!("{} {} {}\n", 10 * (i % 60), 10 * (i / 60), 1000 + i % 3);
+        let rows: String = (0..3600).map(row).collect();
+        std::fs::write(&scan, &rows).expect("written");
+        let line = ["x", "--up=0,0.1,1", "--sensor-height", "-0.9", "--scale", "0.001"];
+        let args = Line::parse_from(line).placed;
+        let bars = Bars::new();
+        let scans = [scan.clone()];
+        let found = read_scans(&args, &scans, 1, Gravity::Given, &bars).expect("a scan");
+        let path = folder.path().join("scene.toml");
+        let room = Room::find(&found.scan, 1);
+        let file = SceneFile::of(&path, &args, &scans, &found, &room, 7).expect("a file");
+        assert_eq!(file.scan[0].file, Path::new("floor.xyz"), "from the file's folder on");
+        file.write(&path).expect("written");
+
+        let plain = Line::parse_from(["x"]).placed;
+        let files = [path.clone()];
+        let again = read_scans(&plain, &files, 1, Gravity::Found, &bars).expect("the same");
+        let (one, other) = (&found.scan.views[0], &again.scan.views[0]);
+        assert_eq!((one.sensor, one.points.len()), (other.sensor, other.points.len()));
+        let apart = |(a, b)| nalgebra::distance::<f64, 3>(a, b);
+        assert!(one.points.iter().zip(&other.points).map(apart).all(|d| d < 1e-12));
+        assert_eq!(again.seed, Some(7));
+
+        let error = read_scans(&args, &files, 1, Gravity::Found, &bars).err().expect("said twice");
+        assert!(error.to_string().contains("leave out --up"), "{error}");
+        std::fs::write(&scan, rows + "0 0 1000\n").expect("written");
+        let error = read_scans(&plain, &files, 1, Gravity::Found, &bars).err().expect("changed");
+        assert!(error.to_string().contains("3601 points, 3600 when"), "{error}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Runs an experiment and holds what came of it.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 use nullsweep_collision::{Options, ToolContact, World};
 use nullsweep_planner::pipeline::{self, Job, PipelineError, StanceChoice};
 use nullsweep_planner::plan::{CostKind, Method};
@@ -270,7 +270,7 @@ pub fn look_between(
         for k in 1..STEPS {
             let t = k as f64 / STEPS as f64;
             let between = p.lerp(&q, t);
-            off.push(off_surface(setting, &tool.pose(&between)));
+            off.push(off_surface(setting, &tool.centre(&between)));
         }
     }
     off.sort_by(f64::total_cmp);
@@ -280,16 +280,15 @@ pub fn look_between(
     Ok(straight)
 }
 
-/// How far the pad's centre is from where it belongs. \[m\]
-fn off_surface(setting: &Setting, pad: &Isometry3<f64>) -> f64 {
-    let under = pad * Point3::new(0.0, 0.0, setting.tool.stand_off);
-    let mut distance = setting.bed.surface().distance(&under);
+/// How far the pad's centre is from the surface, less the stand-off where the tool has one. \[m\]
+fn off_surface(setting: &Setting, pad: &Point3<f64>) -> f64 {
+    let mut distance = setting.bed.surface().distance(pad);
     if distance.is_infinite() {
         // So far off, the nearest point will do.
         let points = setting.scan.points.iter();
-        distance = points.map(|p| nalgebra::distance(p, &under)).fold(f64::INFINITY, f64::min);
+        distance = points.map(|p| nalgebra::distance(p, pad)).fold(f64::INFINITY, f64::min);
     }
-    distance
+    (distance - setting.tool.stand_off.max(0.0)).abs()
 }
 
 /// Plans in the tracked model with all methods and costs. `job` says all but these; the stance that

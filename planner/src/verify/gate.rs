@@ -25,8 +25,8 @@ pub struct Verification {
     pub collision_checks: usize,
     /// Farthest that the pad centre leaves the planned line between knots. \[m\]
     pub line_deviation_max_m: f64,
-    /// 95th percentile of the distance between the scanned surface and the point `stand_off` ahead of
-    /// the pad's centre, over the motion on the surface. \[m\]
+    /// 95th percentile of the pad centre's distance from the scanned surface, less the stand-off of a
+    /// tool that works from afar, over the motion on the surface. \[m\]
     pub scan_distance_p95_m: f64,
     /// The largest of those. \[m\]
     pub scan_distance_max_m: f64,
@@ -226,12 +226,15 @@ fn arm_of(plan: &Plan, given: Given<'_>) -> Result<Arm, VerifyError> {
     Ok(arm)
 }
 
-/// Of the point `stand_off` ahead of the pad's centre from the scanned surface, ascending. \[m\]
+/// Of the pad's centre from the scanned surface, less the stand-off where it has one, ascending. \[m\]
 fn distances(plan: &Plan, scan: &Scan, pads: &[Pad]) -> Vec<f64> {
     let surface = Surface::new(scan);
     let mut distances: Vec<f64> = pads
         .par_iter()
-        .map(|p| surface.distance(&(p.pose * Point3::new(0.0, 0.0, plan.tool.stand_off))))
+        .map(|p| {
+            let centre = Point3::from(p.pose.translation.vector);
+            (surface.distance(&centre) - plan.tool.stand_off.max(0.0)).abs()
+        })
         .collect();
     distances.sort_by(f64::total_cmp);
     distances
