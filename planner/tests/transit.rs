@@ -49,6 +49,9 @@ fn way(from: JointVector, to: JointVector, profile: Profile) -> Result<Plan, Tra
         seed: 1,
     };
     let outcome = transit::run(&Robot::pr2(), &scene(), &job, &Silent)?;
+    let room = outcome.clearance;
+    assert!(room.arm > 0.0 && room.hand > 0.0, "{room:?}");
+    assert!(room.arm.min(room.hand) < transit::FARTHEST, "{room:?}");
     assert_eq!(outcome.verification.violations, []);
     Ok(outcome.plan)
 }

@@ -83,7 +83,9 @@ pub(super) fn run(args: &GotoArgs) -> anyhow::Result<u8> {
         println!("the arm is there already");
         return Ok(OK);
     };
-    print!("{}", outlook(&found, Some(&arm), resting(args.site.site(), &arm).as_ref()));
+    let now = resting(args.site.site(), &arm);
+    print!("{}{}", outlook(&found.plan, Some(&arm), now.as_ref()), found.room());
+    let found = found.plan;
     if let Some(out) = &args.out {
         found.write(out)?;
         println!("plan: {}", out.display());

@@ -13,7 +13,7 @@ use crate::exit::{OK, VIOLATIONS};
 use crate::robot::RobotArgs;
 use crate::send::{SendArgs, outlook, resting};
 use crate::site::SiteArgs;
-use crate::way::{Broken, Way, WayArgs};
+use crate::way::{Broken, Found, Way, WayArgs};
 
 #[derive(Debug, Args)]
 pub(super) struct PublishArgs {
@@ -65,14 +65,14 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     let now = arm.as_ref().filter(|_| join == Join::Stop).and_then(|arm| resting(site, arm));
     if let Some(first) = &first {
         println!("to the plan's start:");
-        print!("{}", outlook(first, arm.as_ref(), now.as_ref()));
+        print!("{}{}", outlook(&first.plan, arm.as_ref(), now.as_ref()), first.room());
     }
     println!("{}:", args.plan.display());
     let now = now.filter(|_| first.is_none());
     print!("{}", outlook(&plan, arm.as_ref(), now.as_ref()));
     args.send.confirm()?;
     if let Some(first) = &first {
-        args.send.send((first, None), arm.as_ref(), site, Join::Stop, true)?;
+        args.send.send((&first.plan, None), arm.as_ref(), site, Join::Stop, true)?;
     }
     args.send.send((&plan, Some(&args.plan)), arm.as_ref(), site, join, args.wait)?;
     Ok(OK)
@@ -87,7 +87,7 @@ impl PublishArgs {
     }
 
     /// The way to the plan's start, where one was asked for and is needed.
-    fn way_to(&self, plan: &Plan) -> anyhow::Result<Option<Plan>> {
+    fn way_to(&self, plan: &Plan) -> anyhow::Result<Option<Found>> {
         let Some(first) = plan.knots.first().filter(|_| self.goto) else { return Ok(None) };
         let way = Way::of(plan, &self.robot, self.site.site(), &self.scans);
         self.way.find(&way, first.q, &Bars::new())

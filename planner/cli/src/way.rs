@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use nullsweep_collision::Clearance;
 use nullsweep_planner::link::Site;
 use nullsweep_planner::link::posture::posture;
 use nullsweep_planner::plan::{Plan, Profile};
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::transit::{self, Transit, TransitError};
+use nullsweep_planner::transit::{self, FARTHEST, Transit, TransitError};
 use nullsweep_planner::verify::same_scan;
 use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::{Arm, JointVector, Tool};
@@ -86,7 +87,7 @@ impl WayArgs {
         way: &Way<'_>,
         to: JointVector,
         bars: &Bars,
-    ) -> anyhow::Result<Option<Plan>> {
+    ) -> anyhow::Result<Option<Found>> {
         let arm = way.arm()?;
         let scene = self.scene(way, bars)?;
         let now = posture(way.site, &arm, LISTEN)?;
@@ -110,7 +111,8 @@ impl WayArgs {
         };
         let violations = &found.verification.violations;
         if violations.is_empty() {
-            return Ok(Some(found.plan.sealed()));
+            let (plan, clearance) = (found.plan.sealed(), found.clearance);
+            return Ok(Some(Found { plan, clearance }));
         }
         tell(violations);
         Err(Broken(violations.len()).into())
@@ -136,6 +138,24 @@ impl WayArgs {
             same_scan(plan, &scene.surface.transformed(&plan.base_pose().inverse()))?;
         }
         Ok(scene)
+    }
+}
+
+/// A way that was found and verified.
+pub(super) struct Found {
+    pub(super) plan: Plan,
+    pub(super) clearance: Clearance,
+}
+
+impl Found {
+    /// How near it comes to what is around it, as a line of an outlook.
+    pub(super) fn room(&self) -> String {
+        let told = |least: f64| match least {
+            least if least >= FARTHEST => format!("over {:.0} mm", 1e3 * FARTHEST),
+            least => format!("{:.0} mm", 1e3 * least),
+        };
+        let (arm, hand) = (told(self.clearance.arm), told(self.clearance.hand));
+        format!("  room      {arm} around the arm, {hand} around its hand\n")
     }
 }
 

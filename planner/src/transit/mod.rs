@@ -5,4 +5,4 @@ mod error;
 mod run;
 
 pub use error::{Place, TransitError};
-pub use run::{Transit, TransitOutcome, run};
+pub use run::{FARTHEST, Transit, TransitOutcome, run};

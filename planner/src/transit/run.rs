@@ -1,6 +1,6 @@
 //! From two postures and a scene to a verified plan.
 
-use nullsweep_collision::{Options, ToolContact, World};
+use nullsweep_collision::{Clearance, Options, ToolContact, World};
 use nullsweep_robot::{ArmSpec, JointVector, Robot, Tool};
 use rayon::prelude::*;
 
@@ -43,7 +43,14 @@ pub struct TransitOutcome {
     pub plan: Plan,
     /// What verification found.
     pub verification: Verification,
+    /// How near it comes to what is around it, at some places of the way; at most [`FARTHEST`].
+    pub clearance: Clearance,
 }
+
+/// Farthest that a clearance is told. \[m\]
+pub const FARTHEST: f64 = 0.5;
+/// At how many places of a way the clearance is looked for.
+const LOOKS: usize = 60;
 
 /// How often the way is looked for, each time with other samples, so many at once.
 const TRIES: u64 = 16;
@@ -94,7 +101,25 @@ pub fn run(
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
     let verification = verify(&plan, given, &|| progress.tick())?;
-    Ok(TransitOutcome { plan, verification })
+    let clearance = clearance(&plan, &world);
+    Ok(TransitOutcome { plan, verification, clearance })
+}
+
+/// The least of arm and hand each, evenly over the joints' motion.
+fn clearance(plan: &Plan, world: &World) -> Clearance {
+    let apart = |k: &usize| plan.knots[*k].q.distance(&plan.knots[k - 1].q);
+    let step = (1..plan.knots.len()).map(|k| apart(&k)).sum::<f64>() / LOOKS as f64;
+    let looks: Vec<JointVector> = (1..plan.knots.len())
+        .flat_map(|k| {
+            let curve = plan.curve(k);
+            let looks = (apart(&k) / step.max(SAME)).ceil().max(1.0) as usize;
+            (0..=looks).map(move |i| curve.at(i as f64 / looks as f64)).collect::<Vec<_>>()
+        })
+        .collect();
+    let all: Vec<Clearance> =
+        looks.par_iter().map(|q| world.exact().clearance(q, FARTHEST)).collect();
+    let least = |of: fn(&Clearance) -> f64| all.iter().map(of).fold(FARTHEST, f64::min);
+    Clearance { arm: least(|c| c.arm), hand: least(|c| c.hand) }
 }
 
 /// Whether the arm may be at both ends: where it is, within the limits that the executor keeps, where

@@ -1,6 +1,7 @@
 //! A program's arguments, with a cell file's values where they say nothing.
 
 use std::ffi::{OsStr, OsString};
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
@@ -26,7 +27,7 @@ pub fn parse<P: Parser>(
 ) -> Result<P, Error> {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
     let command = P::command().arg(cell_argument());
-    told(&args, &command)?;
+    describe(&args, &command);
     let given = given(&args).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from));
     let found = || std::env::current_dir().ok().and_then(|folder| Cell::find(&folder));
     let path = given.clone().or_else(found).filter(|path| !path.as_os_str().is_empty());
@@ -53,17 +54,17 @@ pub fn parse_alone<P: Parser>(
     args: impl IntoIterator<Item = impl Into<OsString>>,
 ) -> Result<P, Error> {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
-    told(&args, &P::command())?;
+    describe(&args, &P::command());
     P::try_parse_from(args)
 }
 
-/// The description instead of a parse, where it is asked for.
-fn told(args: &[OsString], command: &Command) -> Result<(), Error> {
+/// Where it is asked for, writes the description and ends the process.
+fn describe(args: &[OsString], command: &Command) {
     if args.get(1).is_some_and(|arg| arg == DESCRIBE) {
-        let text = Described::of(command).to_json();
-        return Err(Error::raw(ErrorKind::DisplayVersion, text));
+        // Whoever asked and reads no more has what it wants.
+        let _ = writeln!(std::io::stdout(), "{}", Described::of(command).to_json());
+        std::process::exit(0);
     }
-    Ok(())
 }
 
 fn cell_argument() -> Arg {
