@@ -255,7 +255,10 @@ fn a_pad_too_high_or_tilted_or_turned_over_sweeps_nothing() {
     };
     let flat = contact(0.2, 0.2, 0.0, 0.7);
     assert!(coverage::share(&coverage::swept(&scan, &[flat], &tool)) > 0.03);
-    none(contact(0.2, 0.2, 0.012, 0.7));
+    // Wiping needs contact: five millimetres above it nothing is wiped, pressed in everything.
+    none(contact(0.2, 0.2, 0.005, 0.7));
+    let pressed = contact(0.2, 0.2, -0.004, 0.7);
+    assert!(coverage::share(&coverage::swept(&scan, &[pressed], &tool)) > 0.03);
     none(flat * UnitQuaternion::from_euler_angles(0.0, 31f64.to_radians(), 0.0));
     none(flat * UnitQuaternion::from_euler_angles(PI, 0.0, 0.0));
     // With a stand-off the pad hovers and still sweeps what it hovers over.

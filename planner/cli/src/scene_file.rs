@@ -165,7 +165,7 @@ mod tests {
         let row = |i: usize| format!("{} {} {}\n", 10 * (i % 60), 10 * (i / 60), 1000 + i % 3);
         let rows: String = (0..3600).map(row).collect();
         std::fs::write(&scan, &rows).expect("written");
-        let line = ["x", "--up=0,0.1,1", "--sensor-height", "-0.9", "--scale", "0.001"];
+        let line = ["x", "--up=0,0.1,1", "--sensor-height", "0.9", "--scale", "0.001"];
         let args = Line::parse_from(line).placed;
         let bars = Bars::new();
         let scans = [scan.clone()];

@@ -29,7 +29,8 @@ fn a_pad_off_the_surface_shows_in_distance_and_coverage() {
     let (sound, lifted) = (judge(&s.bang, &s.scene), judge(&lifted, &s.scene));
     assert!(sound.scan_distance_max_m < 0.006, "{}", sound.scan_distance_max_m);
     for distance in [lifted.scan_distance_p95_m, lifted.scan_distance_max_m] {
-        assert!((0.017..0.026).contains(&distance), "{distance}");
+        // From up to 4 mm below the surface.
+        assert!((0.013..0.026).contains(&distance), "{distance}");
     }
     assert!((lifted.line_deviation_max_m - 0.02).abs() < 1e-3, "{}", lifted.line_deviation_max_m);
     for (before, now) in [
