@@ -88,7 +88,13 @@ pub fn front(
 ) -> Result<Front, FrontError> {
     check(points)?;
     let ahead = points.partition_point(|p| passed_ns > 0 && p.after_ns <= passed_ns);
-    let rest = &points[ahead..];
+    let mut rest = &points[ahead..];
+    let there = |p: &Waypoint| guard.farthest(holds, &p.q, guard.start_tolerance).is_none();
+    // Its first point says where it begins, at time 0, or where it was thought to.
+    let starts_there = ahead == 0 && rest.first().is_some_and(|p| p.after_ns == 0 && there(p));
+    if !starts_there && rest.len() > 1 && rest[0].after_ns == 0 {
+        rest = &rest[1..];
+    }
     let Some(first) = rest.first() else {
         return Err(FrontError::Past { points: points.len() });
     };
@@ -104,8 +110,7 @@ pub fn front(
     let start = knot(0, *holds, JointVector::ZERO);
     let at = |time_ns, p: &Waypoint| knot(time_ns, p.q + turns, p.v.unwrap_or(JointVector::ZERO));
     let wished_ns = first.after_ns - passed_ns;
-    // A first point at time 0 is where it begins: the executor's own connector leads there.
-    let starts_there = ahead == 0 && first.after_ns == 0;
+    // To one that is near enough the executor's own connector leads.
     let lead_ns = if starts_there {
         0
     } else {
@@ -200,6 +205,19 @@ mod tests {
             assert_eq!(knot.time_from_start_ns, p.after_ns);
             assert_eq!((knot.positions[0], knot.velocities[0]), (p.q[0], p.v.expect("some")[0]));
         }
+    }
+
+    /// A program that plans from where the arm is measured may be behind it.
+    #[test]
+    fn what_begins_elsewhere_is_gone_to_from_where_the_arm_holds() {
+        let points = [point(0, 0.05, 0.0), point(1000, 0.1, 0.0)];
+        let found = front(&points, 0, &JointVector::ZERO, &guard()).expect("a plan");
+        assert_eq!((found.knots.len(), found.later_ns), (2, 0));
+        assert_eq!((found.knots[0].positions[0], found.knots[1].positions[0]), (0.0, 0.1));
+        // Where it is all that there is, it is gone to as fast as that may be.
+        let found = front(&points[..1], 0, &JointVector::ZERO, &guard()).expect("a plan");
+        assert!(found.knots.len() == 2 && found.knots[1].positions[0] == 0.05, "{found:?}");
+        assert!((0.1..1.0).contains(&(found.later_ns as f64 * 1e-9)), "{found:?}");
     }
 
     #[test]

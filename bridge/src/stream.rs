@@ -224,8 +224,8 @@ impl Stream {
         }
         let playout = Playout::begin(self.rules.delay_ns, setpoint.sequence, setpoint.deadline_ns);
         let moves = self.rest.is_some_and(|(_, at_ns)| at_ns > playout.at_ns());
-        let mode = setpoint.mode;
-        if far || moves || mode == Mode::Fault.wire() || mode == Mode::Init.wire() {
+        // In Init the executor waits for the answer that only what is followed has.
+        if far || moves || setpoint.mode == Mode::Fault.wire() {
             return;
         }
         // The controller goes on from its own setpoint, not from where the arm is.

@@ -45,7 +45,8 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     // The executor's: no setpoint waits for whoever reads it.
-    let log = Log::install("ros2_bridge=info,nullsweep_bridge=info,warn");
+    let log =
+        Log::install("ros2_bridge=info,nullsweep_bridge=info,rustdds=off,ros2_client=off,warn");
     let result = match &cli.command {
         Command::Run(args) => endpoint::run(&cli.common, args),
         Command::Serve(args) => serve::run(&cli.common, args),

@@ -84,6 +84,10 @@ struct Server {
     goals: Goals<GoalId, RmwRequestId>,
     wish: Option<Wish>,
     running: Option<Running>,
+    /// The last one that was: telemetry may tell it still.
+    last: PlanId,
+    /// When the last one ended: what was told before says nothing. \[ns\]
+    ended_ns: u64,
     newest: Option<Telemetry>,
     /// When the running plan was last asked to stop, and the question.
     stopping: Option<(Instant, Asked)>,
@@ -113,6 +117,8 @@ impl Server {
             goals: Goals::default(),
             wish: None,
             running: None,
+            last: PlanId::NONE,
+            ended_ns: 0,
             newest: None,
             stopping: None,
         })
@@ -161,6 +167,7 @@ impl Server {
     fn event(&mut self, event: &PlanEvent, door: &mut Door) {
         let Some(running) = self.running.as_mut().filter(|r| r.plan == event.plan) else { return };
         let Some(kind) = EventKind::from_wire(event.kind) else { return };
+        self.ended_ns = event.stamp_ns;
         let reason = Reason::from_wire(event.reason).unwrap_or(Reason::None);
         match kind {
             EventKind::Accepted => {
@@ -234,8 +241,7 @@ impl Server {
         let Some(now) = self.fresh() else {
             return refuse("no executor is there, or it is silent", door);
         };
-        let theirs = now.plan.is_some() && self.running.as_ref().is_none_or(|r| r.plan != now.plan);
-        if theirs && self.running.is_none() {
+        if self.running.is_none() && now.plan.is_some() && now.plan != self.last {
             return refuse("the executor has a plan of somebody else's", door);
         }
         if let Some((asker, _)) = self.wish.take().and_then(|old| old.goal) {
@@ -309,13 +315,13 @@ impl Server {
     /// Publishes what is to be followed, once the arm holds.
     fn begin(&mut self, door: &mut Door) {
         let Some(now) = self.fresh().copied() else { return };
-        if self.running.is_some() || now.plan.is_some() || now.mode != Mode::Hold.wire() {
+        let known = now.stamp_ns > self.ended_ns && now.plan == PlanId::NONE;
+        if self.running.is_some() || !known || now.mode != Mode::Hold.wire() {
             if self.running.is_none() && now.mode == Mode::Fault.wire() {
                 self.refuse_wish("the executor is in a fault", door);
             }
             return;
         }
-        // A plan is there before telemetry tells it: what is older says nothing.
         let Some(wish) = self.wish.take() else { return };
         let holds =
             JointVector::from_fn(|j| if j < self.guard.dof { now.commanded[j] } else { 0.0 });
@@ -339,6 +345,7 @@ impl Server {
         };
         match self.plans.publish(&header, &made.knots) {
             Ok(plan) => {
+                self.last = plan;
                 let (asker, goal) = wish.goal.unzip();
                 let since = Instant::now();
                 self.running = Some(Running { plan, goal, asker, since, accepted: false });

@@ -313,3 +313,49 @@ fn a_controller_that_splices_on_arrival_goes_on_as_it_did() {
         assert!(farthest < 1e-3, "{latency} ms, {lost} lost: {farthest} rad beside the way");
     }
 }
+
+/// The executor begins only with an endpoint that says what it follows, and the arm does not move
+/// for it, nor sinks after its own sag.
+#[test]
+fn an_executor_that_waits_for_an_answer_gets_one() {
+    use nullsweep_executor::Guard;
+    use nullsweep_executor::cycle::{Input, Measured, State, step};
+    use nullsweep_ipc_types::status;
+    use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+    let guard = Guard { stale_ns: 50 * MS, lost_ns: 200 * MS, ..Guard::new(arm.limits()) };
+    let (mut state, mut stream) = (State::default(), Stream::new(rules()));
+    let mut controller = Controller { segments: Vec::new() };
+    let (mut began, mut home) = (None, arm.home());
+    home[0] = -0.003;
+    for k in 1..=3000u64 {
+        let now = (1000 + k) * MS;
+        // The arm hangs 3 mrad below what its controller aims at.
+        let mut q = home;
+        q[0] = controller.at(now)[0] - 0.003;
+        let measured = (k % 10 == 0).then(|| Measured {
+            stamp_ns: now,
+            setpoint_sequence: stream.in_force(now).map_or(0, |(sequence, _)| sequence),
+            joint_count: DOF,
+            q,
+            status: status::CALIBRATED,
+        });
+        let out = step(&mut state, Input { measured, ..Input::default() }, now, &guard);
+        if let Some(target) = out.setpoint {
+            let mut s = setpoint(target.sequence, 0.0, 0.0);
+            (s.deadline_ns, s.mode) = (now + MS, target.mode.wire());
+            s.positions[..8].copy_from_slice(&target.q[..]);
+            stream.take(&s, &q);
+        }
+        if k % 20 == 0 {
+            stream.message(now).iter().for_each(|m| controller.take(m));
+        }
+        if state.snapshot().mode == Mode::Hold {
+            began.get_or_insert(k);
+        }
+    }
+    assert!(began.is_some_and(|k| k < 300), "holds after {began:?} cycles");
+    let sunk = controller.at(4000 * MS)[0];
+    assert!(sunk.abs() < 0.0035, "the arm sank by {sunk} rad");
+}

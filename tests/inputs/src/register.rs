@@ -18,8 +18,7 @@ pub(crate) fn run(bytes: &[u8]) -> bool {
 /// Whether the second half lies on the first.
 fn lay(points: &[Point3<f64>]) -> bool {
     let (first, second) = points.split_at(points.len() / 2);
-    let [first, second] =
-        [first, second].map(|p| View { points: p.to_vec(), normals: None, sensor: None });
+    let [first, second] = [first, second].map(|p| View { points: p.to_vec(), ..View::default() });
     let Ok(found) = register(&[first], &second) else { return false };
     let figures = [found.moved, found.turned, found.overlap, found.residual, found.hold];
     assert!(figures.iter().all(|x| x.is_finite() && *x >= 0.0), "{found:?}");

@@ -41,13 +41,13 @@ fn ask(raw: &RawScan) -> bool {
 }
 
 pub(crate) fn made() -> Vec<Vec<u8>> {
-    // A floor of two metres square and a box on it.
+    // A floor and a box on it, as dense as normals need.
     let square = |count: u32, side: f64| {
         (0..count * count).map(move |k| [side * f64::from(k % count), side * f64::from(k / count)])
     };
-    let floor = square(40, 0.05).map(|[x, y]| Point3::new(x, y, 0.0));
-    let top = square(20, 0.015).map(|[x, y]| Point3::new(0.8 + x, 0.9 + y, 0.3));
-    let side = square(20, 0.015).map(|[x, z]| Point3::new(0.8 + x, 0.9, z));
+    let floor = square(64, 0.02).map(|[x, y]| Point3::new(x, y, 0.0));
+    let top = square(20, 0.015).map(|[x, y]| Point3::new(0.5 + x, 0.6 + y, 0.3));
+    let side = square(20, 0.015).map(|[x, z]| Point3::new(0.5 + x, 0.6, z));
     vec![table(floor.chain(top).chain(side))]
 }
 

@@ -1,0 +1,66 @@
+"""A stage with the executor behind `ros2-bridge serve`, on the mock hardware, and a program that
+sends it goals."""
+
+import collections
+import json
+import random
+import subprocess
+
+from jtc import HERE
+from stage import Stage, tell
+
+
+class Front(Stage):
+    def __init__(self, folder, ipc, bins, side, python):
+        self.python = python
+        env = dict(ROS_DOMAIN_ID=str(random.randrange(1, 100)),
+                   ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", ROS_LOG_DIR=str(folder / "ros"))
+        super().__init__(folder, ipc, bins, side, env)
+
+    def perform(self, plan, count):
+        """Sends goals to an arm that stands where `plan` begins; whether each had its one end."""
+        held = json.load(open(plan))["held"]
+        held = [word for h in held for word in ("--held", f"{h['name']}={h['position']}")]
+        figures = self.folder / "goals.json"
+        try:
+            mock = self.start("mock", self.executor.with_name("mock-hardware"), "--plan", plan,
+                              "--arm", self.side, *self.place)
+            self.start_executor()
+            self.start("serve", self.bridge, "serve", "--arm", self.side, "--publish-joint-states",
+                       *held, *self.place)
+            program = self.start("goals", self.python, HERE / "goals.py", "--count", count, "--json",
+                                 figures)
+            program.wait(60 + 5 * count)
+            self.end(mock)
+            quiet = mock.returncode == 0
+        except subprocess.TimeoutExpired:
+            quiet = False
+        finally:
+            self.close()
+        if not figures.exists():
+            print(self.said("goals")[-2000:], self.said("serve")[-2000:])
+            return False
+        return judge(json.load(open(figures)), quiet)
+
+
+def judge(found, quiet):
+    goals = found["goals"]
+    taken = [g for g in goals if g["accepted"]]
+    ends = collections.Counter((g["kind"], *g["ends"]) for g in taken)
+    words = ", ".join(f"{' '.join(key)} {n}" for key, n in sorted(ends.items()))
+    one = all(len(g["ends"]) == 1 for g in taken)
+    ran = [g for g in taken if g["kind"] == "run"]
+    return tell([
+        ("every goal was answered", all(g["accepted"] is not None for g in goals),
+         f"{len(goals)} goals, {len(taken)} accepted, in {found['seconds']:.0f} s"),
+        ("nearly every goal was accepted", len(taken) >= 0.98 * len(goals),
+         f"{len(goals) - len(taken)} refused"),
+        ("each accepted one had exactly one end", one, words),
+        ("what was left alone succeeded", all(g["ends"] == ["succeeded"] for g in ran), f"{len(ran)}"),
+        ("what was cancelled or replaced did not go on for ever",
+         all(g["ends"][0] in ("canceled", "aborted", "succeeded") for g in taken), "as above"),
+        ("a result asked for again is the same", found["same"], ""),
+        ("a trajectory on the topic moves the arm", found["topic"], ""),
+        ("feedback came", found["feedback"] > len(taken), f"{found['feedback']} messages"),
+        ("the endpoint saw no violation", quiet, "by the mock's judge"),
+    ])
