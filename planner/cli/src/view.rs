@@ -109,6 +109,7 @@ fn of_plans(
         collision: &collision,
         scene: scene.as_ref(),
         verification: verification.as_ref(),
+        left_out: &[],
         tables: verification.as_ref().map(table).into_iter().collect(),
         lines: Vec::new(),
     })
