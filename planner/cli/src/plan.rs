@@ -252,6 +252,7 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
             collision: &args.robot.collision(),
             scene: Some(scene),
             verification: Some(&figures.verification),
+            left_out: &figures.left_out,
             tables: vec![figures_table(figures)],
             lines: vec![report::LineSet {
                 name: "graph".into(),

@@ -41,6 +41,9 @@ pub(super) struct ViewArgs {
     /// Where the page is written; without it beside the first file, its name with `.html` behind.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Write the same as an MCAP log as well, for Foxglove, rerun and whatever reads ROS 2 messages.
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
     /// Only write the page, open nothing.
     #[arg(long)]
     no_open: bool,
@@ -69,6 +72,10 @@ pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
     let out = args.out.clone().unwrap_or_else(|| beside(args.files.first()));
     report::write(&out, &data)?;
     println!("page: {}", out.display());
+    if let Some(path) = &args.mcap {
+        report::write_log(path, &data)?;
+        println!("log: {}", path.display());
+    }
     if !args.no_open {
         open(&out);
     }
@@ -109,6 +116,7 @@ fn of_plans(
         collision: &collision,
         scene: scene.as_ref(),
         verification: verification.as_ref(),
+        left_out: &[],
         tables: verification.as_ref().map(table).into_iter().collect(),
         lines: Vec::new(),
     })

@@ -201,3 +201,46 @@ fn a_scan_shows_its_planes_and_objects() {
     let groups = data["places"].as_array().unwrap();
     assert!(groups.iter().any(|g| !g["items"].as_array().unwrap().is_empty()));
 }
+
+#[test]
+fn a_log_holds_the_joints_transforms_and_shapes_as_ros_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, arm) = plan(Side::Right, Profile::Acceleration);
+    let file = write(folder.path(), "plan.json", &plan);
+    let log = folder.path().join("plan.mcap");
+    let args = [file.to_str().unwrap(), "--mcap", log.to_str().unwrap()];
+    page(folder.path(), "plan.html", &args);
+    let bytes = std::fs::read(&log).unwrap();
+    let messages: Vec<mcap::Message<'_>> =
+        mcap::MessageStream::new(&bytes).unwrap().collect::<Result<_, _>>().unwrap();
+    let on = |topic: &str| messages.iter().filter(|m| m.channel.topic == topic).collect::<Vec<_>>();
+    for (topic, kind, count) in [
+        ("/joint_states", "sensor_msgs/msg/JointState", 586),
+        ("/tf", "tf2_msgs/msg/TFMessage", 586),
+        ("/robot", "visualization_msgs/msg/MarkerArray", 1),
+        ("/path", "nav_msgs/msg/Path", 1),
+    ] {
+        let found = on(topic);
+        assert_eq!(found.len(), count, "{topic}");
+        let schema = found[0].channel.schema.as_ref().unwrap();
+        assert_eq!((schema.name.as_str(), schema.encoding.as_str()), (kind, "ros2msg"));
+        assert_eq!(found[0].channel.message_encoding, "cdr");
+    }
+    let contains = |data: &[u8], what: &[u8]| data.windows(what.len()).any(|w| w == what);
+    let last = on("/joint_states")[585];
+    assert_eq!(last.log_time, 11_700_000_000);
+    for (j, name) in arm.joint_names().iter().enumerate() {
+        assert!(contains(&last.data, name.as_bytes()));
+        let end = plan.knots[39].q[j].to_le_bytes();
+        assert!(contains(&last.data, &end), "{name} is not where the plan ends");
+    }
+    // Half a second in, between two knots: on the cubic.
+    let between = plan.curve(2).at(2.0 / 3.0);
+    let at = |value: f64| {
+        let data = &on("/joint_states")[25].data;
+        (0..data.len() - 7)
+            .map(|i| f64::from_le_bytes(data[i..i + 8].try_into().unwrap()))
+            .any(|found| (found - value).abs() < 1e-9)
+    };
+    assert!((0..arm.dof()).all(|j| at(between[j])));
+}

@@ -27,7 +27,9 @@
 
 mod data;
 mod left;
+mod log;
 mod page;
+mod ros;
 mod wire;
 
 pub use data::{
@@ -35,4 +37,5 @@ pub use data::{
     Probe, ReportData, ReportError, Series, Shape, Table, Tone,
 };
 pub use left::{LeftPoint, places};
+pub use log::{LogError, write_log};
 pub use page::{render, write};

@@ -21,6 +21,9 @@ pub struct LeftOut {
     /// By how much the posture that comes nearest falls short, least and most of the patches: of a
     /// margin \[m\], of a limit \[rad\] or \[m\]; none for what is no matter of postures.
     pub short: Option<[f64; 2]>,
+    /// The points, as indices into the scan, ascending.
+    #[serde(skip)]
+    pub points: Vec<u32>,
 }
 
 impl std::fmt::Display for LeftOut {
@@ -84,10 +87,10 @@ pub(super) fn left_out(cell: Workcell<'_>, known: &Known<'_>) -> Vec<LeftOut> {
             }
         })
         .collect();
-    let mut rows: BTreeMap<&Cause, (usize, BTreeSet<usize>)> = BTreeMap::new();
-    for (owner, _) in owner.iter().zip(swept).filter(|(_, swept)| !**swept) {
+    let mut rows: BTreeMap<&Cause, (Vec<u32>, BTreeSet<usize>)> = BTreeMap::new();
+    for (i, (owner, _)) in owner.iter().zip(swept).enumerate().filter(|(_, (_, swept))| !**swept) {
         let row = rows.entry(owner.map_or(&Cause::Uneven, |p| &causes[p].0)).or_default();
-        row.0 += 1;
+        row.0.push(i as u32);
         row.1.extend(owner);
     }
     let total = scan.points.len().max(1) as f64;
@@ -96,8 +99,8 @@ pub(super) fn left_out(cell: Workcell<'_>, known: &Known<'_>) -> Vec<LeftOut> {
         .map(|(cause, (points, of))| {
             let short = of.iter().filter_map(|&p| causes[p].1).map(|s| [s, s]);
             let short = short.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-            let share = points as f64 / total;
-            LeftOut { cause: cause.clone(), patches: of.len(), share, short }
+            let share = points.len() as f64 / total;
+            LeftOut { cause: cause.clone(), patches: of.len(), share, short, points }
         })
         .collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));

@@ -164,6 +164,7 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("ratatui", &["executor/src/top"]),
     ("indicatif", &["planner/cli"]),
     ("plotly", &["tests"]),
+    ("mcap", &["planner/report", "planner/cli/tests"]),
     ("plotters", &["planner/experiment"]),
     ("comfy-table", &["planner/cli", "planner/experiment", "tests"]),
 ];

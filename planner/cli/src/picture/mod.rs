@@ -29,7 +29,7 @@ pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
         );
     }
     let here = sitter.scene.map(|scene| scene.transformed(&plan.base_pose().inverse()));
-    let points = Points::of(plan, sitter.arm, here.as_ref(), sitter.verification);
+    let points = Points::of(plan, sitter.arm, here.as_ref(), sitter.verification, sitter.left_out);
     let robot = robot::shapes(&sitter, here.as_ref())?;
     let plans = motions(&sitter, here.as_ref())?;
     let (headline, notes) = headline(&sitter, here.as_ref(), &points, &plans, &robot);

@@ -1,15 +1,16 @@
 //! The scan by what was swept, and what is left by cause and place.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use nullsweep_planner::pipeline::LeftOut;
 use nullsweep_planner::plan::{Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
 use nullsweep_planner::verify::Verification;
-use nullsweep_planner::workcell::Scene;
+use nullsweep_planner::workcell::{Cause, Scene};
 use nullsweep_report::{Cloud, LeftPoint, Paint, PlaceGroup, places};
 use nullsweep_robot::Arm;
 use nullsweep_surface::Scan;
 
-/// Why a point may be left.
+/// Why a point may be left, where a plan file is all that says it.
 const CAUSES: [&str; 3] = [
     "No arm pose free of collision touches it",
     "Reachable, but no motion was found that leads there",
@@ -35,6 +36,7 @@ impl Points {
         arm: &Arm,
         here: Option<&Scene>,
         verification: Option<&Verification>,
+        left_out: &[LeftOut],
     ) -> Self {
         let scan = surface(plan);
         let swept = match verification {
@@ -44,11 +46,22 @@ impl Points {
                 coverage::swept_by(&scan, past.chain([plan.trajectory()]), arm)
             }
         };
-        let cause = causes(plan);
-        let left: Vec<LeftPoint> = (0..swept.len())
-            .filter(|i| !swept[*i])
-            .map(|i| LeftPoint { at: scan.points[i], normal: scan.normals[i], cause: cause(i) })
-            .collect();
+        let left = |i: usize, cause: usize| LeftPoint {
+            at: scan.points[i],
+            normal: scan.normals[i],
+            cause,
+        };
+        let (causes, left): (Vec<String>, Vec<LeftPoint>) = if left_out.is_empty() {
+            let cause = causes(plan);
+            let points = (0..swept.len()).filter(|i| !swept[*i]).map(|i| left(i, cause(i)));
+            (CAUSES.map(str::to_owned).into(), points.collect())
+        } else {
+            let of = |(cause, all): (usize, &LeftOut)| {
+                all.points.iter().map(move |i| (*i as usize, cause)).collect::<Vec<_>>()
+            };
+            let points = left_out.iter().enumerate().flat_map(of).map(|(i, cause)| left(i, cause));
+            (left_out.iter().map(|l| in_words(&l.cause)).collect(), points.collect())
+        };
         let some = |want: bool| {
             let all = scan.points.iter().zip(&swept);
             all.filter(|(_, s)| **s == want).map(|(p, _)| *p).collect()
@@ -73,12 +86,19 @@ impl Points {
         };
         Self {
             clouds,
-            places: places(&CAUSES.map(str::to_owned), &left, swept.len()),
+            places: places(&causes, &left, swept.len()),
             all: swept.len(),
             left: left.len(),
             shares: [share(&|i| plan.surface[i].reachable), share(&|_| true)],
         }
     }
+}
+
+/// A cause as a heading.
+fn in_words(cause: &Cause) -> String {
+    let text = cause.to_string();
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// The points that the plan is to sweep.

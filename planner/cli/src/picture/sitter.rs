@@ -1,6 +1,7 @@
 //! What a page is made of.
 
 use nullsweep_collision::Options;
+use nullsweep_planner::pipeline::LeftOut;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
@@ -19,6 +20,8 @@ pub(crate) struct Sitter<'a> {
     pub(crate) scene: Option<&'a Scene>,
     /// What the last plan's check found, if it was checked.
     pub(crate) verification: Option<&'a Verification>,
+    /// What the last plan leaves, by cause, where its making told it.
+    pub(crate) left_out: &'a [LeftOut],
     pub(crate) tables: Vec<Table>,
     pub(crate) lines: Vec<LineSet>,
 }
