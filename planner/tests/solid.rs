@@ -32,7 +32,8 @@ fn no_part_of_a_robot_is_inside_a_closed_mesh() {
         let pose = Isometry3::identity();
         let (placed, _) = place(&raw.expect("a mesh"), &Placement::Frame { pose, sensor: None });
         let (scene, _) = Scene::seen(&placed, None, &CleanConfig::default()).expect("a surface");
-        let exact = Exact::new(&robot, &arm, &tool, scene.points(), &[], &options).expect("a check");
+        let exact =
+            Exact::new(&robot, &arm, &tool, scene.points(), &[], &options).expect("a check");
         let world = World::new(&robot, &arm, &tool, scene.points(), &[], &options).expect("one");
         let home = arm.home();
         // The skin is far from every part of it.
