@@ -422,3 +422,26 @@ fn damaged_text_does_not_panic() {
     }
     assert!(refused > 100, "{refused}");
 }
+
+#[test]
+fn an_arm_without_soft_limits_is_kept_off_its_hard_ones() {
+    let robot = Robot::from_urdf_str(
+        "<robot name='r'><link name='a'/><link name='b'/><link name='c'/><link name='d'/>\
+         <joint name='hard' type='revolute'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/>\
+         <limit lower='-1' upper='2' velocity='1' effort='1'/></joint>\
+         <joint name='soft' type='revolute'><parent link='b'/><child link='c'/><axis xyz='0 1 0'/>\
+         <limit lower='-1' upper='2' velocity='1' effort='1'/>\
+         <safety_controller soft_lower_limit='-0.9' soft_upper_limit='1.9' k_velocity='1'/></joint>\
+         <joint name='short' type='prismatic'><parent link='c'/><child link='d'/>\
+         <axis xyz='0 0 1'/><limit lower='0' upper='0.1' velocity='1' effort='1'/></joint></robot>",
+    )
+    .unwrap();
+    let arm = robot.arm(&ArmSpec { base: "a".into(), tip: "d".into() }).unwrap();
+    assert_eq!(arm.joints_without_soft_limits(), ["hard", "short"]);
+    let wanted = [(-0.99, 1.99), (-0.9, 1.9), (0.001, 0.099)];
+    for ((lower, upper), (low, high)) in arm.margined_limits().iter().zip(wanted) {
+        assert!((lower - low).abs() < 1e-12 && (upper - high).abs() < 1e-12, "{lower} {upper}");
+    }
+    // The rule of planner and executor stays what the description says.
+    assert_eq!(arm.braking_limits(0, 1.0), (-1.0, 2.0));
+}

@@ -35,7 +35,7 @@ use crate::site::SiteArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ; or one scene file that `planner scene` wrote.
+    /// Scan files: PCD, PLY, XYZ/CSV, STL, OBJ, glTF/GLB, LAS/LAZ, E57, PTX or NPY; or one scene file that `planner scene` wrote.
     #[arg(required_unless_present = "demo", conflicts_with = "demo")]
     scans: Vec<PathBuf>,
     /// Plan for a simulated scan instead.
@@ -213,6 +213,7 @@ pub(super) fn make(
         writable(out)?;
     }
     let robot = args.robot.robot()?;
+    args.robot.tell(&robot, &bars)?;
     let job = job(args, &robot, site, after, &bars)?;
     bars.stage("scan", None);
     let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
@@ -288,6 +289,7 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         0 => "unseen space free".to_owned(),
         n => format!("{n} of unseen space"),
     };
+    let found = violations(v.violations.len(), &a.guessed_links);
     let against = format!(
         "{} points of the surface, {} others, {} raw, {unseen}, {} obstacles",
         a.surface_points, a.other_points, a.raw_points, a.obstacles
@@ -304,11 +306,23 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         ),
         ("facing, p95, max", format!("{:.0}, {:.0}°", facing.0, facing.1)),
         ("touching, p50", format!("{:.0} %", 100.0 * p.touching_p50)),
-        ("violations", v.violations.len().to_string()),
+        ("violations", found),
         ("  against", against),
     ]
     .map(|(name, value)| [name.to_owned(), value])
     .into()
+}
+
+/// How many violations were found, and for how many links that is a guess.
+pub(super) fn violations(count: usize, guessed: &[String]) -> String {
+    match guessed {
+        [] => count.to_string(),
+        [first, rest @ ..] => {
+            let more =
+                if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+            format!("{count}, by a guess: capsules stand for the meshes of {first}{more}")
+        }
+    }
 }
 
 /// The figures as name and value, for people.
@@ -381,6 +395,12 @@ fn job(
                 StanceSearch { held: held(args), ..StanceSearch::of(robot, &arm, &tool) };
             if args.torso.is_some() {
                 search.lift = None;
+            }
+            if arm.has_numeric_ik() {
+                bars.note(
+                    "the arm has no closed inverse kinematics that is known: to search for its \
+                     stance takes many minutes; --base x,y,yaw says where it stands",
+                );
             }
             StanceChoice::Search(search)
         }

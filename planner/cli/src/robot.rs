@@ -6,8 +6,10 @@ use std::str::FromStr;
 use anyhow::Context;
 use clap::Args;
 use nullsweep_collision::{MeshPaths, Options};
+use nullsweep_planner::progress::Progress;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
 
+use crate::bars::Bars;
 use crate::posture_arg::NamedPosture;
 
 #[derive(Debug, Args)]
@@ -95,6 +97,19 @@ impl RobotArgs {
 
     pub(super) fn postures(&self) -> &[NamedPosture] {
         &self.posture
+    }
+
+    /// What is taken of the arm that its description does not say.
+    pub(super) fn tell(&self, robot: &Robot, bars: &Bars) -> anyhow::Result<()> {
+        let arm = robot.arm(&self.spec())?;
+        let hard = arm.joints_without_soft_limits();
+        if !hard.is_empty() {
+            bars.note(&format!(
+                "no soft limits: {} keep 0.01 rad or m from their hard ones",
+                hard.join(", ")
+            ));
+        }
+        Ok(())
     }
 
     /// How its collision shapes are found.

@@ -18,7 +18,7 @@ use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
 pub(super) struct SceneCommandArgs {
-    /// Scan files: PCD, PLY, XYZ/CSV, STL or OBJ.
+    /// Scan files: PCD, PLY, XYZ/CSV, STL, OBJ, glTF/GLB, LAS/LAZ, E57, PTX or NPY.
     #[arg(required = true)]
     scans: Vec<PathBuf>,
     #[command(flatten)]

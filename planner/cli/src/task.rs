@@ -13,6 +13,7 @@ use crate::bars::Bars;
 use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::{finite, velocity};
+use crate::plan::violations;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::sheet::sheet;
@@ -58,6 +59,7 @@ pub(super) struct TaskArgs {
 pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
     let robot = args.robot.robot()?;
+    args.robot.tell(&robot, &bars)?;
     let task::Poses { poses, notes } = task::read(&args.poses)?;
     for note in &notes {
         bars.note(note);
@@ -116,7 +118,10 @@ fn table(f: &TaskFigures) -> Table {
         ["task time".to_owned(), format!("{:.2} s", f.task_time_s)],
         ["beyond the tolerance, max".to_owned(), format!("{:.1e}", f.excess_max)],
         ["edge deviation, p90, max".to_owned(), deviation],
-        ["violations, against itself and the floor".to_owned(), f.violations.to_string()],
+        [
+            "violations, against itself and the floor".to_owned(),
+            violations(f.violations, &f.guessed_links),
+        ],
         ["calculation".to_owned(), format!("{:.2} s", f.calc_time_s)],
         ["verification".to_owned(), format!("{:.2} s", f.verify_time_s)],
     ]);

@@ -66,6 +66,12 @@ impl Exact {
         &self.tree
     }
 
+    /// The links whose shapes are fitted capsules: what is found of them is a guess.
+    #[must_use]
+    pub fn guessed_links(&self) -> &[String] {
+        &self.scene.guessed
+    }
+
     /// Whether everything keeps its margin at the joint vector `q`. \[rad\] or \[m\] One with NaN or ∞
     /// is not free.
     #[must_use]
@@ -107,9 +113,12 @@ impl Exact {
     fn obstacle_hit(&self, poses: &[Pose], parts: &[usize], with_floor: bool) -> Option<Hit> {
         let scene = &self.scene;
         let margin = scene.margins.environment;
-        for obstacle in scene.obstacles.iter().filter(|o| with_floor || !o.carries_robot) {
+        for (index, obstacle) in scene.obstacles.iter().enumerate() {
+            if obstacle.carries_robot && !with_floor {
+                continue;
+            }
             let at = pose(&obstacle.pose);
-            for &i in parts {
+            for &i in parts.iter().filter(|&&i| !scene.grounded.contains(&(i, index))) {
                 let shape = &*scene.parts[i].shape;
                 let distance = distance(&poses[i], shape, &at, &*obstacle.shape);
                 if breaks(distance, margin) {

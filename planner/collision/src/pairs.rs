@@ -170,7 +170,7 @@ fn are_welded_neighbours(robot: &Robot, first: &Part, second: &Part) -> bool {
 }
 
 /// Home, then seeded random configurations within the limits.
-fn sample(arm: &Arm) -> Vec<JointVector> {
+pub(crate) fn sample(arm: &Arm) -> Vec<JointVector> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let mut samples = vec![arm.home()];
     samples.resize_with(SAMPLES + 1, || {

@@ -40,14 +40,25 @@ impl Part {
     }
 }
 
-/// All parts of robot, tool and attached objects, in link order; and what was made up, in words.
+/// What a robot, its tool and attached objects are made of.
+pub(crate) struct Parts {
+    /// In link order.
+    pub(crate) parts: Vec<Part>,
+    /// Links whose shapes are fitted capsules: guesses.
+    pub(crate) guessed: Vec<String>,
+    /// What was made up, left out or looked for, in words.
+    pub(crate) notes: Vec<String>,
+}
+
+/// All parts of robot, tool and attached objects.
 pub(crate) fn collect(
     robot: &Robot,
     arm: &Arm,
     tool: &Tool,
     options: &Options,
-) -> Result<(Vec<Part>, Vec<String>), CollisionError> {
+) -> Result<Parts, CollisionError> {
     let (mut parts, mut notes, mut places) = (Vec::new(), Vec::new(), BTreeSet::new());
+    let mut guessed = Vec::new();
     let moving = arm.moving_links();
     for (index, link) in robot.links().iter().enumerate() {
         if link.empty_shapes > 0 {
@@ -74,10 +85,11 @@ pub(crate) fn collect(
                 let fitted = fit(robot, index, radius, false);
                 if !fitted.is_empty() {
                     notes.push(format!(
-                        "{}: no collision shape; {} capsule(s) of radius {radius} m fitted",
+                        "{}: no collision shape; {} capsule(s) of radius {radius} m fitted, a guess",
                         link.name,
                         fitted.len()
                     ));
+                    guessed.push(link.name.clone());
                     parts.extend(fitted);
                 }
             }
@@ -85,10 +97,11 @@ pub(crate) fn collect(
             (Some(error), Some(radius)) => {
                 let fitted = fit(robot, index, radius, true);
                 notes.push(format!(
-                    "{}: {error}; {} capsule(s) of radius {radius} m fitted instead",
+                    "{}: {error}; {} capsule(s) of radius {radius} m fitted instead, a guess",
                     link.name,
                     fitted.len()
                 ));
+                guessed.push(link.name.clone());
                 parts.extend(fitted);
             }
             (Some(error), None) => {
@@ -111,7 +124,7 @@ pub(crate) fn collect(
     let pad = Part::new(None, &tool.name, Solid::Box { half }, centre);
     parts.push(Part { is_pad: true, ..pad });
     notes.extend(places);
-    Ok((parts, notes))
+    Ok(Parts { parts, guessed, notes })
 }
 
 /// Capsules from a link's origin to the joints of its children; a ball at the origin where

@@ -1,6 +1,8 @@
 //! What both checks are built from: the robot's parts, the pairs of them to check, the scan's points
 //! and the obstacles.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Isometry3;
 use nullsweep_robot::{Arm, Robot, Tool};
 use parry3d_f64::shape::SharedShape;
@@ -10,10 +12,11 @@ use crate::error::CollisionError;
 use crate::mesh::MeshPaths;
 use crate::obstacle::{Obstacle, ObstacleShape};
 use crate::options::Options;
-use crate::pairs::{self, Pairs};
-use crate::parts::{self, Part};
+use crate::pairs::{self, Pairs, sample};
+use crate::parts::{self, Part, Parts};
 use crate::points::{Points, Sorted};
 use crate::rules::Margins;
+use crate::shapes::{distance, pose, poses};
 use crate::solid::{Prepared, Solid};
 
 /// A robot with its tool, scan and obstacles, all shapes prepared; in the root frame.
@@ -30,7 +33,12 @@ pub(crate) struct Scene {
     pub(crate) obstacles: Vec<PreparedObstacle>,
     pub(crate) tool: Tool,
     pub(crate) margins: Margins,
-    /// What was made up, in words.
+    /// Parts, by their index, that meet an obstacle that carries the robot in every posture: they
+    /// are not checked against it.
+    pub(crate) grounded: BTreeSet<(usize, usize)>,
+    /// Links whose shapes are guesses.
+    pub(crate) guessed: Vec<String>,
+    /// What was made up, left out or looked for, in words.
     pub(crate) notes: Vec<String>,
 }
 
@@ -59,7 +67,7 @@ impl Scene {
         tool.check()?;
         let bodies = Bodies::new(robot, arm)
             .map_err(|count| CollisionError::TooManyBodies { count, most: MAX_BODIES })?;
-        let (parts, notes) = parts::collect(robot, arm, tool, options)?;
+        let Parts { parts, guessed, mut notes } = parts::collect(robot, arm, tool, options)?;
         let pairs = pairs::find(robot, arm, &bodies, &parts, options)?;
         let obstacles = obstacles
             .iter()
@@ -67,9 +75,18 @@ impl Scene {
             .collect::<Result<Vec<_>, _>>()?
             .concat();
         let body_of = |part: &Part| bodies.carrier(part.link).0;
+        let moves: Vec<bool> = parts.iter().map(|part| body_of(part).is_some()).collect();
+        let grounded =
+            grounded(robot, arm, &parts, &moves, &obstacles, options.margins.environment);
+        for name in grounded.iter().map(|&(part, _)| &parts[part].name).collect::<BTreeSet<_>>() {
+            notes.push(format!(
+                "{name} meets what the robot stands on in every posture, and is not checked against \
+                 it: is the base as high as the real one?"
+            ));
+        }
         let scene = Self {
             links: robot.links().len(),
-            moves: parts.iter().map(|part| body_of(part).is_some()).collect(),
+            moves,
             at_tip: parts.iter().map(|part| body_of(part) == Some(bodies.tip_body)).collect(),
             parts,
             pairs,
@@ -77,10 +94,42 @@ impl Scene {
             obstacles,
             tool: tool.clone(),
             margins: options.margins,
+            grounded,
+            guessed,
             notes,
         };
         Ok((scene, bodies))
     }
+}
+
+/// Which moving parts come too near to which obstacles that carry the robot at home and in all
+/// sampled configurations.
+fn grounded(
+    robot: &Robot,
+    arm: &Arm,
+    parts: &[Part],
+    moves: &[bool],
+    obstacles: &[PreparedObstacle],
+    margin: f64,
+) -> BTreeSet<(usize, usize)> {
+    let carries = |i: &usize| obstacles[*i].carries_robot;
+    let mut found: BTreeSet<(usize, usize)> = (0..parts.len())
+        .filter(|&part| moves[part] && !parts[part].is_pad)
+        .flat_map(|part| (0..obstacles.len()).filter(carries).map(move |i| (part, i)))
+        .collect();
+    // Home comes first, where hardly any part is that low.
+    for q in sample(arm) {
+        if found.is_empty() {
+            break;
+        }
+        let at = poses(parts, robot.links().len(), arm, &q);
+        found.retain(|&(part, i)| {
+            let obstacle = &obstacles[i];
+            distance(&at[part], &*parts[part].shape, &pose(&obstacle.pose), &*obstacle.shape)
+                < margin
+        });
+    }
+    found
 }
 
 impl PreparedObstacle {

@@ -162,9 +162,13 @@ fn sort(scene: &Scene, bodies: &Bodies, contact: &Contact) -> Sorted {
         }
     }
     pairs.sort_by_key(|&(a, b): &(usize, usize)| (moving[a].body, moving[b].body));
-    for obstacle in &scene.obstacles {
-        for shape in &mut moving {
-            shape.against.push(fixed.len());
+    for (index, obstacle) in scene.obstacles.iter().enumerate() {
+        for (part, slot) in slots.iter().enumerate() {
+            if let (Some(_), shape) = *slot
+                && !scene.grounded.contains(&(part, index))
+            {
+                moving[shape].against.push(fixed.len());
+            }
         }
         let place = Frame::from(&obstacle.pose);
         fixed.push(Fixed::new(&obstacle.solid, &obstacle.shape, place, margins.environment));

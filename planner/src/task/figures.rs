@@ -33,6 +33,8 @@ pub struct TaskFigures {
     pub calc_time_s: f64,
     /// Verification. \[s\]
     pub verify_time_s: f64,
+    /// Links whose meshes are missing: capsules stand for them, a guess.
+    pub guessed_links: Vec<String>,
     /// What was made up for the collision check.
     pub notes: Vec<String>,
 }

@@ -80,6 +80,7 @@ pub fn run(
         edge_deviation_p90_m: off.get(off.len() * 9 / 10).copied().unwrap_or(0.0),
         edge_deviation_max_m: off.last().copied().unwrap_or(0.0),
         violations: verification.violations.len(),
+        guessed_links: verification.against.guessed_links.clone(),
         calc_time_s,
         verify_time_s: started.elapsed().as_secs_f64(),
         notes: world.notes().to_vec(),

@@ -45,7 +45,7 @@ pub struct Verification {
 }
 
 /// What the arm was held against: how many of each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Against {
     /// Points of the surface.
     pub surface_points: usize,
@@ -57,16 +57,20 @@ pub struct Against {
     pub unseen_points: usize,
     /// Solid things.
     pub obstacles: usize,
+    /// Links whose meshes are missing: capsules stand for them, a guess, so that what was found
+    /// says nothing of the real ones.
+    pub guessed_links: Vec<String>,
 }
 
 impl Against {
-    fn of(scene: &Scene) -> Self {
+    fn of(scene: &Scene, exact: &Exact) -> Self {
         Self {
             surface_points: scene.surface.points.len(),
             other_points: scene.surroundings.len(),
             raw_points: scene.raw.len(),
             unseen_points: scene.unseen.len(),
             obstacles: scene.obstacles.len(),
+            guessed_links: exact.guessed_links().to_vec(),
         }
     }
 }
@@ -188,7 +192,7 @@ pub fn verify(
         line_deviation_max_m,
         scan_distance_p95_m: percentile(&distances, 0.95),
         press: press(&scene, &poses, &plan.tool),
-        against: Against::of(&scene),
+        against: Against::of(&scene, &exact),
         scan_distance_max_m: distances.last().copied().unwrap_or(0.0),
         coverage_all: share(&|_| true),
         coverage_reachable: share(&|i| plan.surface[i].reachable),

@@ -200,7 +200,17 @@ impl Arm {
         self.limits[joint].braking(velocity)
     }
 
-    /// [`Arm::braking_limits`] of each joint at its largest speed.
+    /// Joints with hard limits only: [`Arm::margined_limits`] keep 0.01 rad or m from these, and at
+    /// most a hundredth of the range.
+    #[must_use]
+    pub fn joints_without_soft_limits(&self) -> Vec<&str> {
+        let is_hard =
+            |name: &&String| self.model.joints.iter().any(|j| j.name == **name && is_hard(j));
+        self.names.iter().filter(is_hard).map(String::as_str).collect()
+    }
+
+    /// [`Arm::braking_limits`] of each joint at its largest speed, and a little inside of hard limits
+    /// where there are no soft ones.
     #[must_use]
     pub fn margined_limits(&self) -> &[(f64, f64)] {
         &self.margined
@@ -254,6 +264,12 @@ impl Arm {
         Box::new(Numeric::new(&self.chain, &self.limits, &self.margined))
     }
 
+    /// Whether the inverse kinematics is numeric: some hundred times slower than a closed form.
+    #[must_use]
+    pub fn has_numeric_ik(&self) -> bool {
+        self.solvers.is_numeric()
+    }
+
     /// Same kinematics as the PR2's and its joint names.
     fn is_pr2(&self) -> bool {
         self.solvers.is_pr2_shaped() && self.names.iter().all(|n| pr2::ready(n).is_some())
@@ -270,7 +286,18 @@ impl Arm {
         let values = Values { model: &model, active, held: &held };
         let chain = build_chain(&values, tip);
         let (placements, moving) = build_placements(&values);
-        let margined: Vec<_> = limits.iter().map(|l| l.braking(l.velocity)).collect();
+        let margined: Vec<_> = active
+            .iter()
+            .zip(&limits)
+            .map(|(&joint, limits)| {
+                let (lower, upper) = limits.braking(limits.velocity);
+                let margin = match is_hard(&model.joints[joint]) {
+                    true => HARD_MARGIN.min(HARD_SHARE * (upper - lower)),
+                    false => 0.0,
+                };
+                (lower + margin, upper - margin)
+            })
+            .collect();
         Self {
             fingerprint: fingerprint(&model, &spec),
             names: active.iter().map(|&j| model.joints[j].name.clone()).collect(),
@@ -285,6 +312,16 @@ impl Arm {
             model,
         }
     }
+}
+
+/// What is kept from hard limits where there are no soft ones [rad or m], and the most of a joint's
+/// range that is so lost at either end.
+const HARD_MARGIN: f64 = 0.01;
+const HARD_SHARE: f64 = 0.01;
+
+/// Whether a joint's limits are hard ones.
+fn is_hard(joint: &Joint) -> bool {
+    joint.kind != JointKind::Continuous && joint.safety.and_then(|s| s.soft).is_none()
 }
 
 /// The independent joints from base to tip.

@@ -78,6 +78,10 @@ impl Solvers {
         }
     }
 
+    pub(crate) fn is_numeric(&self) -> bool {
+        matches!(self, Self::Numeric(_))
+    }
+
     pub(crate) fn is_pr2_shaped(&self) -> bool {
         matches!(self, Self::Pr2 { .. })
     }

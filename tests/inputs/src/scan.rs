@@ -8,7 +8,18 @@ use nullsweep_surface::{CleanConfig, PatchConfig, Placement, clean, patches, pla
 
 /// Points of a scan that is cleaned and cut into patches here.
 const POINTS: usize = 3000;
-const FORMATS: [Format; 5] = [Format::Pcd, Format::Ply, Format::Stl, Format::Obj, Format::Text];
+const FORMATS: [Format; 10] = [
+    Format::Pcd,
+    Format::Ply,
+    Format::Stl,
+    Format::Obj,
+    Format::Gltf,
+    Format::Las,
+    Format::E57,
+    Format::Ptx,
+    Format::Npy,
+    Format::Text,
+];
 
 pub(crate) fn run(bytes: &[u8]) -> bool {
     let scans = scans(bytes);

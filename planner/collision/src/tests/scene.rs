@@ -147,3 +147,40 @@ fn a_tool_that_cannot_be_is_refused_by_both_checks() {
         }
     }
 }
+
+/// A link that turns about the vertical and hangs below the floor by its own shape.
+#[test]
+fn what_meets_the_floor_in_every_posture_is_excused_by_name_and_nothing_else() {
+    let robot = Robot::from_urdf_str(
+        "<robot name='low'><link name='base'/>\
+         <link name='turret'><collision><origin xyz='0 0 0.02'/><geometry>\
+         <cylinder radius='0.1' length='0.1'/></geometry></collision></link>\
+         <link name='boom'><collision><origin xyz='0.2 0 0'/><geometry>\
+         <box size='0.4 0.04 0.04'/></geometry></collision></link>\
+         <joint name='turn' type='revolute'><parent link='base'/><child link='turret'/>\
+         <axis xyz='0 0 1'/><limit lower='-3' upper='3' velocity='1' effort='1'/></joint>\
+         <joint name='lift' type='revolute'><parent link='turret'/><child link='boom'/>\
+         <origin xyz='0 0 0.2'/><axis xyz='0 -1 0'/>\
+         <limit lower='-1.5' upper='1.5' velocity='1' effort='1'/></joint></robot>",
+    )
+    .unwrap();
+    let arm = robot.arm(&ArmSpec { base: "base".into(), tip: "boom".into() }).unwrap();
+    let tool = Tool { centre: [0.4, 0.0, 0.0], ..Tool::default() };
+    let floor = [Obstacle::floor(Isometry3::identity())];
+    let world = World::new(&robot, &arm, &tool, &[], &floor, &Options::default()).unwrap();
+    let told: Vec<_> = world.notes().iter().filter(|note| note.contains("every posture")).collect();
+    assert!(told.len() == 1 && told[0].starts_with("turret "), "{told:?}");
+    let at = |lift: f64| {
+        let mut q = JointVector::ZERO;
+        q[1] = lift;
+        let free = world.is_free(&q, ToolContact::Forbidden);
+        assert_eq!(free, world.exact().is_free(&q, ToolContact::Forbidden), "{lift}");
+        free
+    };
+    assert!(
+        at(0.5),
+        "only the turret is low: {:?}",
+        world.why_not(&arm.home(), ToolContact::Forbidden)
+    );
+    assert!(!at(-1.0), "the boom is in the floor");
+}

@@ -50,3 +50,62 @@ fn pose(transform: &Transform) -> Option<Isometry3<f64>> {
     let turn = UnitQuaternion::try_new(turn, 1e-6).filter(|_| is_sound)?;
     Some(Isometry3::from_parts(place, turn))
 }
+
+#[cfg(test)]
+mod tests {
+    use e57::{E57Writer, Quaternion, Record, RecordValue, Translation};
+
+    use super::*;
+
+    /// A grid of 200 points in a plane, seen from a scanner 2 m up and turned a quarter.
+    fn file(scans: usize) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut writer = E57Writer::new(&mut bytes, "file").unwrap();
+        for scan in 0..scans {
+            let prototype =
+                vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+            let mut cloud = writer.add_pointcloud(&format!("scan{scan}"), prototype).unwrap();
+            let half = std::f64::consts::FRAC_1_SQRT_2;
+            cloud.set_transform(Some(Transform {
+                rotation: Quaternion { w: half, x: 0.0, y: 0.0, z: half },
+                translation: Translation { x: 0.0, y: 0.0, z: 2.0 },
+            }));
+            for i in 0..200 {
+                let (x, y) = (f64::from(i % 20), f64::from(i / 20));
+                let values = [x, y, -2.0].map(RecordValue::Double);
+                cloud.add_point(values.into()).unwrap();
+            }
+            cloud.finalize().unwrap();
+        }
+        writer.finalize().unwrap();
+        drop(writer);
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn every_scan_is_moved_to_its_pose() {
+        let one = parse(&file(1)).unwrap();
+        assert_eq!(one.points.len(), 200);
+        assert!((one.points[23] - Point3::new(-1.0, 3.0, 0.0)).norm() < 1e-9, "{}", one.points[23]);
+        let sensor = one.viewpoint.unwrap();
+        assert!((sensor * Point3::new(3.0, 1.0, -2.0) - one.points[23]).norm() < 1e-9);
+        let two = parse(&file(2)).unwrap();
+        assert_eq!((two.points.len(), two.viewpoint), (400, None));
+        assert!(two.warnings[0].to_string().starts_with("2 scan(s)"));
+    }
+
+    #[test]
+    fn broken_files_are_refused_without_a_panic() {
+        let whole = file(1);
+        for cut in (0..whole.len()).step_by(97) {
+            assert!(parse(&whole[..cut]).is_err(), "{cut} of {}", whole.len());
+        }
+        for at in (0..whole.len()).filter(|at| *at < 64 || at % 13 == 0) {
+            for value in [0x00, 0xFF] {
+                let mut bytes = whole.clone();
+                bytes[at] = value;
+                let _ = parse(&bytes);
+            }
+        }
+    }
+}
