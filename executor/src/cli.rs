@@ -128,7 +128,7 @@ where
     I: IntoIterator<Item = T>,
     T: Into<OsString>,
 {
-    let cli: Cli = match nullsweep_cell::parse(args, &[]) {
+    let cli: Cli = match nullsweep_cell::parse(args, &[], &["ctl"]) {
         Ok(cli) => cli,
         Err(e) => {
             let _ = e.print();

@@ -8,6 +8,7 @@ use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, Error, Parser};
 
+use crate::causes::causes;
 use crate::defaults::Defaults;
 use crate::describe::{DESCRIBE, Described};
 use crate::file::{Cell, FILE_NAME};
@@ -17,13 +18,15 @@ pub const VARIABLE: &str = "NULLSWEEP_CELL";
 
 /// Parses a command line, program name first. Flags that it leaves out are taken from the cell file
 /// that `--cell` or [`VARIABLE`] names, or the nearest one in the working folder and above; the
-/// latter is told on standard error. `apart`: subcommands that take some flags from no cell.
+/// latter is told on standard error. `apart`: subcommands that take some flags from no cell; `urgent`:
+/// those that a cell file which cannot be used keeps from nothing, as stopping an arm.
 ///
 /// # Errors
 /// As [`Parser::try_parse_from`], help and version included; a cell file that cannot be used.
 pub fn parse<P: Parser>(
     args: impl IntoIterator<Item = impl Into<OsString>>,
     apart: &[(&str, &[&str])],
+    urgent: &[&str],
 ) -> Result<P, Error> {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
     let command = P::command().arg(cell_argument());
@@ -35,15 +38,29 @@ pub fn parse<P: Parser>(
         let mut matches = command.try_get_matches_from(args)?;
         return P::from_arg_matches_mut(&mut matches);
     };
-    let cell = Cell::read(&path)
-        .map_err(|why| Error::raw(ErrorKind::ValueValidation, format!("{why}\n")))?;
+    let cell = match Cell::read(&path) {
+        Ok(cell) => cell,
+        Err(why) if args.get(1).is_some_and(|arg| urgent.iter().any(|name| arg == name)) => {
+            say(&format!("warning: {why}; what it says is not heeded"));
+            Cell::default()
+        }
+        Err(why) => {
+            let text = format!("{}\n", causes(&why));
+            return Err(Error::raw(ErrorKind::ValueValidation, text));
+        }
+    };
     let defaults = Defaults::from(&cell);
     let mut furnished = defaults.furnish(command, apart);
     let mut matches = furnished.try_get_matches_from_mut(args)?;
     if given.is_none() && is_used(&defaults, &furnished, &matches) {
-        eprintln!("note: what is not given is taken from {}", path.display());
+        say(&format!("note: what is not given is taken from {}", path.display()));
     }
     P::from_arg_matches_mut(&mut matches)
+}
+
+/// Says something on standard error; nobody need hear it.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// As [`parse`], for a program that has nothing to do with a cell.
@@ -145,7 +162,8 @@ mod tests {
         let path = folder.join("own.toml");
         std::fs::write(&path, CELL).expect("written");
         let cell = ["--cell", path.to_str().expect("UTF-8")];
-        parse::<Cli>([&["x"], args, &cell].concat(), &[("replan", &["base"])]).map(|c| c.command)
+        parse::<Cli>([&["x"], args, &cell].concat(), &[("replan", &["base"])], &[])
+            .map(|c| c.command)
     }
 
     #[test]
@@ -180,7 +198,14 @@ mod tests {
         let error = Cell::read(&path).expect_err("misspelt").to_string();
         assert!(error.contains("cell.toml") && error.contains("urfd"), "{error}");
         let args = ["x", "plan", "--cell", path.to_str().expect("UTF-8")];
-        let error = parse::<Cli>(args, &[]).expect_err("misspelt");
+        let error = parse::<Cli>(args, &[], &[]).expect_err("misspelt");
         assert!(error.use_stderr() && error.to_string().contains("line 2"), "{error}");
+        // What cannot wait goes on without.
+        let args = ["x", "replan", "--cell", path.to_str().expect("UTF-8")];
+        assert!(parse::<Cli>(args, &[], &["plan"]).is_err());
+        let Ok(Cli { command: Sub::Replan { base: None } }) = parse::<Cli>(args, &[], &["replan"])
+        else {
+            panic!("it goes on");
+        };
     }
 }

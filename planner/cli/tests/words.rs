@@ -1,0 +1,98 @@
+//! What the command line says, and when: usage before work, no cause twice, nothing about a closed pipe.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use nullsweep_planner::plan::{Plan, PlanKnot};
+use nullsweep_robot::{ArmSpec, JointVector, Robot, Side, Tool};
+
+fn planner(folder: &Path, args: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_planner"));
+    command.args(args.split(' ')).current_dir(folder).stdin(Stdio::null());
+    command
+}
+
+fn run(folder: &Path, args: &str) -> (Option<i32>, String, String) {
+    let Output { status, stdout, stderr } = planner(folder, args).output().expect("it starts");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+    (status.code(), text(stdout), text(stderr))
+}
+
+/// A plan file of many knots.
+fn long_plan(path: &Path) {
+    let robot = Robot::pr2();
+    let arm = robot.arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+    let knot = |k: u64| PlanKnot {
+        time_ns: k * 1_000_000,
+        q: arm.home(),
+        v: JointVector::ZERO,
+        line: None,
+        patch: None,
+    };
+    let plan = Plan::of(&robot, &arm, &Tool::default(), (0..5000).map(knot).collect());
+    plan.write(path).expect("written");
+}
+
+#[test]
+fn a_posture_with_too_few_joints_is_wrong_usage() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for flag in ["--start", "--end"] {
+        let (code, _, said) = run(folder.path(), &format!("plan --demo chair-seat {flag} 0.1,0.2"));
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(flag) && said.contains("2 joints, but the arm has 7: r_"), "{said}");
+    }
+    let (code, _, said) = run(folder.path(), "plan --demo chair-seat --start nowhere");
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("no posture `nowhere`"), "{said}");
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_told_before_the_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for flag in ["--out", "--json", "--report"] {
+        let (code, out, said) =
+            run(folder.path(), &format!("plan missing.pcd {flag} no/such/folder/x"));
+        assert_eq!((code, out.as_str()), (Some(1), ""), "{said}");
+        assert!(said.contains("cannot write no/such/folder/x"), "{flag}: {said}");
+        assert_eq!(said.matches("No such file").count(), 1, "{said}");
+    }
+}
+
+#[test]
+fn no_cause_is_told_twice() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("no.json"), "no plan").expect("written");
+    for (args, cause) in [
+        ("inspect missing.json", "No such file"),
+        ("inspect no.json", "expected"),
+        ("plan --demo chair-seat --urdf missing.urdf", "No such file"),
+        ("plan --demo chair-seat --tool missing.toml", "No such file"),
+    ] {
+        let (code, _, said) = run(folder.path(), args);
+        assert_eq!(code, Some(1), "{said}");
+        assert_eq!(said.matches(cause).count(), 1, "{args}: {said}");
+    }
+}
+
+#[test]
+fn tables_fit_80_columns() {
+    let folder = tempfile::tempdir().expect("a folder");
+    long_plan(&folder.path().join("plan.json"));
+    let (code, out, said) = run(folder.path(), "inspect plan.json");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(out.lines().count() > 10 && out.contains('°'), "{out}");
+    assert!(out.lines().all(|line| line.chars().count() <= 80), "{out}");
+}
+
+#[test]
+fn a_closed_pipe_ends_it_without_a_word() {
+    let folder = tempfile::tempdir().expect("a folder");
+    long_plan(&folder.path().join("plan.json"));
+    for args in ["export plan.json --format csv", "inspect plan.json --json -"] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let output = planner(folder.path(), args).stdout(writer).output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!((output.status.code(), &*said), (Some(141), ""), "{args}");
+    }
+}
