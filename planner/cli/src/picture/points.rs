@@ -5,16 +5,16 @@ use nullsweep_planner::pipeline::LeftOut;
 use nullsweep_planner::plan::{Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
 use nullsweep_planner::verify::Verification;
-use nullsweep_planner::workcell::{Cause, Scene};
+use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Cloud, LeftPoint, Paint, PlaceGroup, places};
 use nullsweep_robot::Arm;
 use nullsweep_surface::Scan;
 
 /// Why a point may be left, where a plan file is all that says it.
 const CAUSES: [&str; 3] = [
-    "No arm pose free of collision touches it",
-    "Reachable, but no motion was found that leads there",
-    "Beside the path: the pad passes near, but not over it",
+    "no arm pose free of collision touches it",
+    "reachable, but no motion was found that leads there",
+    "beside the path: the pad passes near, but not over it",
 ];
 
 /// What is known of a plan's points.
@@ -60,7 +60,7 @@ impl Points {
                 all.points.iter().map(move |i| (*i as usize, cause)).collect::<Vec<_>>()
             };
             let points = left_out.iter().enumerate().flat_map(of).map(|(i, cause)| left(i, cause));
-            (left_out.iter().map(|l| in_words(&l.cause)).collect(), points.collect())
+            (left_out.iter().map(|l| l.cause.to_string()).collect(), points.collect())
         };
         let some = |want: bool| {
             let all = scan.points.iter().zip(&swept);
@@ -92,13 +92,6 @@ impl Points {
             shares: [share(&|i| plan.surface[i].reachable), share(&|_| true)],
         }
     }
-}
-
-/// A cause as a heading.
-fn in_words(cause: &Cause) -> String {
-    let text = cause.to_string();
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// The points that the plan is to sweep.
