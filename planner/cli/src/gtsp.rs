@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use nullsweep_gtsp::tsplib::{TsplibError, read_gtsp, write_tour};
 use nullsweep_gtsp::{
-    Budget, Instance, SolveError, Tour, TourCost, lower_bound, solve, solve_transformed,
+    Budget, Effort, Instance, SolveError, Tour, TourCost, lower_bound, solve, solve_transformed,
 };
 use serde::Serialize;
 
@@ -38,6 +38,10 @@ pub(super) struct GtspArgs {
     /// Best known value: prints the gap to it.
     #[arg(long)]
     best: Option<f64>,
+    /// Wall-clock limit in seconds of the search for a lower bound; 5 where it is not given, and a
+    /// number of steps instead where --trials is the only limit. 0: no bound.
+    #[arg(long, value_parser = seconds)]
+    bound: Option<Duration>,
     /// How to solve it.
     #[arg(long, value_enum, default_value_t = Method::Search)]
     method: Method,
@@ -86,6 +90,7 @@ struct Report<'a> {
     seconds: f64,
     trials: u64,
     seed: u64,
+    /// No tour costs less.
     lower_bound: Option<f64>,
     /// Excess over the best known value [%].
     gap_percent: Option<f64>,
@@ -97,12 +102,21 @@ pub(super) fn run(args: &GtspArgs, out: &mut dyn Write) -> Result<(), GtspCliErr
     let file = read_gtsp(&args.file)
         .map_err(|source| GtspCliError::File { file: args.file.clone(), source })?;
     let started = Instant::now();
-    let (tour, cost, trials, bound) = match args.method {
+    let (tour, cost, trials, proven) = match args.method {
         Method::Search => {
             let solution = solve(&file.instance, &budget(args), args.seed)?;
-            (solution.tour, solution.cost, solution.trials, solution.lower_bound)
+            (solution.tour, solution.cost, solution.trials, solution.proven)
         }
-        Method::Transformed => transformed(&file.instance, &budget(args), args.seed),
+        Method::Transformed => {
+            let (tour, cost, trials) = transformed(&file.instance, &budget(args), args.seed);
+            (tour, cost, trials, false)
+        }
+    };
+    let spent = started.elapsed();
+    let bound = match effort(args) {
+        _ if proven => Some(cost.total()),
+        Some(effort) => lower_bound(&file.instance, &tour, effort),
+        None => None,
     };
     let value = cost.total();
     let numbers = file.tour_numbers(&tour);
@@ -112,10 +126,10 @@ pub(super) fn run(args: &GtspArgs, out: &mut dyn Write) -> Result<(), GtspCliErr
         nodes: file.instance.nodes(),
         value,
         jumps: cost.jumps,
-        seconds: started.elapsed().as_secs_f64(),
+        seconds: spent.as_secs_f64(),
         trials,
         seed: args.seed,
-        lower_bound: bound.or_else(|| lower_bound(&file.instance)),
+        lower_bound: bound,
         gap_percent: args
             .best
             .map(|best| 100.0 * (value - best) / best.abs().max(f64::MIN_POSITIVE)),
@@ -146,19 +160,25 @@ pub(super) fn run(args: &GtspArgs, out: &mut dyn Write) -> Result<(), GtspCliErr
 }
 
 fn summary(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
+    write!(out, "{}: best {}", report.name, report.value)?;
+    match report.lower_bound {
+        Some(bound) if bound >= report.value => write!(out, ", no tour is shorter")?,
+        Some(bound) => {
+            let gap = 100.0 * (report.value - bound) / bound.abs().max(f64::MIN_POSITIVE);
+            write!(out, ", no tour is shorter than {bound:.1} (gap {gap:.2} %)")?;
+        }
+        None => {}
+    }
     write!(
         out,
-        "{}: value {} in {:.2} s, {} trials, {} clusters, {} nodes",
-        report.name, report.value, report.seconds, report.trials, report.clusters, report.nodes
+        ", in {:.2} s, {} trials, {} clusters, {} nodes",
+        report.seconds, report.trials, report.clusters, report.nodes
     )?;
     if report.jumps > 0 {
         write!(out, ", {} jumps", report.jumps)?;
     }
-    if let Some(bound) = report.lower_bound {
-        write!(out, ", lower bound {bound:.1}")?;
-    }
     if let Some(gap) = report.gap_percent {
-        write!(out, ", gap {gap:.4} %")?;
+        write!(out, ", {gap:.4} % above the best known")?;
     }
     writeln!(out)
 }
@@ -177,11 +197,19 @@ fn budget(args: &GtspArgs) -> Budget {
     Budget { trials: args.trials, time, threads: args.threads, target: args.best }
 }
 
-fn transformed(
-    instance: &Instance,
-    budget: &Budget,
-    seed: u64,
-) -> (Tour, TourCost, u64, Option<f64>) {
+/// `None`: no bound is asked for.
+fn effort(args: &GtspArgs) -> Option<Effort> {
+    match (args.bound, args.seconds, args.trials) {
+        (None, None, Some(_)) => Some(Effort { steps: 5000, time: None }),
+        (Some(Duration::ZERO), ..) => None,
+        (time, ..) => {
+            let time = Some(time.unwrap_or(Duration::from_secs(5)));
+            Some(Effort { steps: u64::MAX, time })
+        }
+    }
+}
+
+fn transformed(instance: &Instance, budget: &Budget, seed: u64) -> (Tour, TourCost, u64) {
     let started = Instant::now();
     let made = std::cell::Cell::new(0);
     let stop = || {
@@ -190,5 +218,5 @@ fn transformed(
         end
     };
     let (tour, cost) = solve_transformed(instance, budget.trials.unwrap_or(u64::MAX), seed, &stop);
-    (tour, cost, made.get(), None)
+    (tour, cost, made.get())
 }

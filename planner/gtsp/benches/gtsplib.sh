@@ -5,7 +5,8 @@
 #
 # DIR holds *.gtsp and, for the gaps, bestknown.tsv (name, clusters, nodes, best value, …).
 # Every instance is solved with seeds 1..SEEDS (5) on THREADS threads (1) within the limit of its
-# size: 1 s up to 60 clusters, 5 s up to 115, 10 s above. A run ends early at the best known value.
+# size: 1 s up to 60 clusters, 5 s up to 115, 10 s up to 400, 60 s up to 2000, 120 s up to 5000, 180 s
+# up to 10,000, 300 s above. A run ends early at the best known value.
 # Printed: the median value and its gap [%], the worst gap, and the mean seconds of a run. Take a
 # machine that does nothing else: the limits are wall-clock time.
 set -euo pipefail
@@ -27,8 +28,10 @@ for file in "$dir"/*.gtsp; do
     name=$(basename "$file" .gtsp)
     clusters=$(sed -n 's/^GTSP_SETS *: *\([0-9]*\).*/\1/p' "$file" | head -n 1)
     best=$(awk -F '\t' -v name="$name" '$1 == name { print $4 }' "$dir/bestknown.tsv" 2>/dev/null || true)
-    limit=10
-    if ((clusters <= 60)); then limit=1; elif ((clusters <= 115)); then limit=5; fi
+    limit=300
+    for size in 10000:180 5000:120 2000:60 400:10 115:5 60:1; do
+        if ((clusters <= ${size%:*})); then limit=${size#*:}; fi
+    done
     for ((seed = 1; seed <= seeds; seed++)); do
         gtsplib "$file" "$limit" "$seed" "$threads" ${best:+"$best"}
     done | sort -g | awk -v name="$name" -v best="$best" '

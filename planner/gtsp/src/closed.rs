@@ -51,6 +51,13 @@ impl<'a> Closed<'a> {
         }
     }
 
+    /// The indices of an instance's tour in closed order.
+    pub(super) fn indices(&self, tour: &Tour) -> Vec<usize> {
+        let places = tour.clusters.iter().zip(&tour.nodes);
+        let nodes = places.map(|(&c, &k)| self.instance.node_index(c, k));
+        self.start.into_iter().chain(nodes).collect()
+    }
+
     /// The instance's tour from indices in closed order.
     pub(super) fn tour(&self, indices: &[usize]) -> Option<Tour> {
         let first = match *self.instance.ends() {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::solve::run_epochs;
 use crate::table::Table;
 use crate::{
-    Block, Budget, Control, Costs, Ends, Instance, InstanceError, Jump, OnDemand, Progress,
+    Block, Budget, Control, Costs, Effort, Ends, Instance, InstanceError, Jump, OnDemand, Progress,
     Solution, SolveError, Tour, TourError, lower_bound, solve, solve_exact, solve_with, tsplib,
 };
 
@@ -116,8 +116,13 @@ proptest! {
         prop_assert!(reached >= least - 1e-6 * least.abs(), "{} below the optimum {}", reached, least);
         prop_assert!(reached <= least + 1e-6 * least.abs(), "{} above the optimum {}", reached, least);
         prop_assert_eq!(found.cost.jumps, cost.jumps);
-        if let Some(bound) = lower_bound(&instance) {
-            prop_assert!(bound <= least + 1e-6 * least.abs(), "{} above the optimum {}", bound, least);
+        let effort = Effort { steps: 400, time: None };
+        // The bound comes from any tour, not from the best one alone.
+        let some = search(&instance, 1, 1);
+        for tour in [&optimal, &some.tour] {
+            if let Some(bound) = lower_bound(&instance, tour, effort) {
+                prop_assert!(bound <= least + 1e-9 * least.abs(), "{} above the optimum {}", bound, least);
+            }
         }
     }
 
@@ -165,6 +170,33 @@ fn the_same_seed_gives_the_same_tour_on_any_number_of_threads() {
         assert_eq!(one, two);
         assert_eq!(one, four);
     }
+}
+
+#[test]
+fn the_bound_is_near_the_optimum() {
+    let effort = Effort { steps: 2000, time: None };
+    for (kind, most) in [(Kind::Symmetric, 0.2), (Kind::Asymmetric, 0.1)] {
+        for ends in 0..3 {
+            let instance = random_instance(kind, 20, 3, ends, 3);
+            let tour = search(&instance, 2000, 1).tour;
+            let bound = lower_bound(&instance, &tour, effort).expect("small enough");
+            assert_eq!(lower_bound(&instance, &tour, effort), Some(bound), "it is repeatable");
+            let gap = tour.cost(&instance).total() / bound - 1.0;
+            assert!(gap < most, "{kind:?}, ends {ends}: {gap}");
+        }
+    }
+}
+
+#[test]
+fn a_bound_needs_a_tour_without_forbidden_jumps() {
+    let block = Block { from: 0, to: 1, costs: vec![1.0] };
+    let costs = Costs::Blocks(vec![block]);
+    let instance = Instance::new(&[1; 3], costs, Jump::Forbidden, Ends::Closed).expect("fits");
+    let effort = Effort { steps: 10, time: None };
+    let tour = Tour { clusters: vec![0, 1, 2], nodes: vec![0; 3] };
+    assert_eq!(lower_bound(&instance, &tour, effort), None);
+    let twice = Tour { clusters: vec![0, 1, 1], nodes: vec![0; 3] };
+    assert_eq!(lower_bound(&instance, &twice, effort), None);
 }
 
 #[test]
@@ -233,7 +265,7 @@ fn one_cluster_costs_nothing() {
     let costs = || Costs::Dense(vec![0.0; 9]);
     let closed = Instance::new(&[3], costs(), Jump::Forbidden, Ends::Closed).expect("fits");
     let solution = solve(&closed, &Budget::trials(10), 0).expect("limited");
-    assert_eq!((solution.cost.total(), solution.gap()), (0.0, Some(0.0)));
+    assert_eq!((solution.cost.total(), solution.proven), (0.0, true));
     let open =
         Instance::new(&[3], costs(), Jump::Forbidden, Ends::OpenFromCosts(vec![5.0, 2.0, 3.0]))
             .expect("fits");
@@ -253,6 +285,29 @@ fn bad_tours_are_named() {
     assert_eq!(check(&[1], &[0]), Err(TourError::Length { clusters: 1, nodes: 1, expected: 2 }));
     assert_eq!(check(&[1, 1], &[0, 1]), Err(TourError::Twice { cluster: 1 }));
     assert_eq!(check(&[0, 1], &[0, 2]), Err(TourError::Index { position: 1, cluster: 1, node: 2 }));
+}
+
+#[test]
+fn many_clusters_are_solved_by_near_arcs() {
+    // A grid: a tour of steps of length 1 is optimal.
+    let side = 46;
+    let at = move |c: usize| [(c % side) as f64, (c / side) as f64];
+    let cost = move |a: usize, i: usize, b: usize, j: usize| {
+        let (p, q) = (at(a), at(b));
+        (p[0] - q[0]).hypot(p[1] - q[1]) + (i + j) as f64
+    };
+    let costs = Costs::OnDemand(OnDemand { neighbours: None, cost: std::sync::Arc::new(cost) });
+    let sizes = vec![2; side * side];
+    let instance = Instance::new(&sizes, costs, Jump::Forbidden, Ends::Closed).expect("fits");
+    let run = |threads| {
+        let budget = Budget { threads, ..Budget::trials(1200) };
+        solve(&instance, &budget, 1).expect("limited")
+    };
+    let (one, two) = (run(1), run(2));
+    one.tour.check(&instance).expect("valid");
+    let least = (side * side) as f64;
+    assert!(one.cost.total() < 1.08 * least, "{} instead of {least}", one.cost.total());
+    assert_eq!((one.tour, one.cost, one.trials), (two.tour, two.cost, two.trials));
 }
 
 #[test]
