@@ -27,7 +27,7 @@ mod tour;
 mod transform;
 pub mod tsplib;
 
-pub use bound::{Effort, lower_bound, lower_bound_until};
+pub use bound::{Effort, lower_bound};
 pub use exact::solve as solve_exact;
 pub use instance::{Block, CostFn, Costs, Ends, Instance, InstanceError, Jump, OnDemand};
 pub use record::{Observer, Progress};

@@ -9,7 +9,6 @@ mod cuts;
 mod prices;
 mod tree;
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::closed::Closed;
@@ -54,16 +53,6 @@ pub struct Effort {
 /// path counts as one) or of more than 4000 nodes, and where the tour does not fit or has a
 /// forbidden jump.
 pub fn lower_bound(instance: &Instance, tour: &Tour, effort: Effort) -> Option<f64> {
-    lower_bound_until(instance, tour, effort, &AtomicBool::new(false))
-}
-
-/// [`lower_bound`], which ends soon after the flag is set.
-pub fn lower_bound_until(
-    instance: &Instance,
-    tour: &Tour,
-    effort: Effort,
-    cancel: &AtomicBool,
-) -> Option<f64> {
     let started = Instant::now();
     tour.check(instance).ok()?;
     let upper = tour.cost(instance).total();
@@ -74,8 +63,7 @@ pub fn lower_bound_until(
     }
     let mut ascent = Ascent::new(&closed, &closed.indices(tour));
     let whole = ascent.links.iter().all(|cost| cost.is_infinite() || cost.fract() == 0.0);
-    let stop =
-        || cancel.load(Ordering::Relaxed) || effort.time.is_some_and(|t| started.elapsed() >= t);
+    let stop = || effort.time.is_some_and(|t| started.elapsed() >= t);
     // Rounding errors of the sums must not lift the bound above an optimum.
     let safe = |bound: f64| {
         let bound = bound - 1e-9 * (bound.abs() + upper.abs());
