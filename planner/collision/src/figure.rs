@@ -11,7 +11,7 @@ use crate::frame::Frame;
 use crate::mesh::MeshPaths;
 use crate::obstacle::{Obstacle, ObstacleShape};
 use crate::options::Options;
-use crate::parts::{self, Part};
+use crate::parts::{self, Part, Parts};
 use crate::solid::Solid;
 
 /// A robot with its tool as it is checked, in the root frame at the arm's held joints.
@@ -96,7 +96,7 @@ impl Figure {
     ) -> Result<Self, CollisionError> {
         let found = Bodies::new(robot, arm)
             .map_err(|count| CollisionError::TooManyBodies { count, most: MAX_BODIES })?;
-        let (parts, notes) = parts::collect(robot, arm, tool, options)?;
+        let Parts { parts, notes, .. } = parts::collect(robot, arm, tool, options)?;
         let shape = |part: &Part| {
             let (body, carrier) = found.carrier(part.link);
             FigureShape {
