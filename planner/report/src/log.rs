@@ -208,8 +208,8 @@ fn whole_path(data: &ReportData) -> ros::Path {
 /// Times of a motion, its end among them. \[s\]
 fn samples(motion: &Motion) -> impl Iterator<Item = f64> + use<> {
     let end = motion.times.last().copied();
-    let steps = end.map_or(0, |end| (end * RATE).ceil() as usize + 1);
-    (0..steps).map(move |k| (k as f64 / RATE).min(end.unwrap_or(0.0)))
+    let steps = end.map_or(0, |end| (end * RATE).ceil() as usize);
+    (0..steps).map(|k| k as f64 / RATE).chain(end)
 }
 
 fn joint_state(data: &ReportData, motion: &Motion, time: f64) -> ros::JointState {
@@ -238,8 +238,10 @@ fn joints_at(motion: &Motion, time: f64) -> (Vec<f64>, Vec<f64>) {
             return (a + u * difference, if span > 0.0 { difference / span } else { 0.0 });
         }
         let [va, vb] = [before, next].map(|k| motion.velocities[j][k] * span);
+        // As the executor has it: a knot is hit to the bit.
+        let ends = |at: f64| if u >= 1.0 { b } else { at };
         let (c, d) = (3.0 * difference - 2.0 * va - vb, va + vb - 2.0 * difference);
-        (a + u * (va + u * (c + u * d)), (va + u * (2.0 * c + 3.0 * u * d)) / span)
+        (ends(a + u * (va + u * (c + u * d))), (va + u * (2.0 * c + 3.0 * u * d)) / span)
     };
     (0..motion.joints.len()).map(one).unzip()
 }
