@@ -14,7 +14,7 @@ const POINTS: usize = 6000;
 
 pub(crate) fn run(bytes: &[u8]) -> bool {
     let scenes = scans(bytes).into_iter().filter(|raw| raw.points.len() <= POINTS);
-    scenes.map(|raw| ask(&raw)).fold(false, |any, found| any || found)
+    scenes.filter(ask).count() > 0
 }
 
 /// Whether it has a plane.

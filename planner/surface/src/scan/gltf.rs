@@ -22,7 +22,7 @@ const HEAD: usize = 12;
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Parsed, Malformed> {
     let wrong = |error: ::gltf::Error| Malformed { place: Place::File, cause: error.to_string() };
     let announced = bytes.get(8..HEAD).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    if bytes.starts_with(b"glTF") && !announced.is_some_and(|n| n as usize >= HEAD) {
+    if bytes.starts_with(b"glTF") && announced.is_none_or(|n| (n as usize) < HEAD) {
         return malformed(Place::Byte(8), "the head is cut short");
     }
     let file = Gltf::from_slice(bytes).map_err(wrong)?;
@@ -111,7 +111,8 @@ impl Gathered {
                 self.parsed.triangles.extend(all);
             }
             Mode::TriangleStrip => {
-                let turned = |k: usize| if k % 2 == 0 { (k - 2, k - 1) } else { (k - 1, k - 2) };
+                let turned =
+                    |k: usize| if k.is_multiple_of(2) { (k - 2, k - 1) } else { (k - 1, k - 2) };
                 let all = (2..last).map(|k| triangle(turned(k).0, turned(k).1, k));
                 self.parsed.triangles.extend(all);
             }
