@@ -7,6 +7,7 @@ mod choices;
 mod exit;
 mod experiment;
 mod export;
+mod floor;
 mod goto;
 mod gtsp;
 mod inspect;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
 use clap::Args;
-use nalgebra::{Isometry3, UnitVector3, Vector3};
+use nalgebra::{UnitVector3, Vector3};
 use nullsweep_planner::progress::Progress;
 use nullsweep_surface::room;
 use nullsweep_surface::scan::ScanWarning;
@@ -12,6 +12,7 @@ use nullsweep_surface::{PlacedScan, Placement, RawScan, ReadOptions, scan};
 
 use crate::advice;
 use crate::bars::Bars;
+use crate::floor::Placed;
 use crate::numbers::{Numbers, finite, isometry, not_negative, positive};
 use crate::scene_file::SceneFile;
 use crate::views;
@@ -46,15 +47,6 @@ pub(super) enum Gravity {
     Given,
     /// The largest level plane of the first scan.
     Found,
-}
-
-/// Scans in the floor frame.
-pub(super) struct Placed {
-    pub(super) scan: PlacedScan,
-    /// Of each file, what takes its coordinates there.
-    pub(super) poses: Vec<Isometry3<f64>>,
-    /// By which a scene file's planes and objects were found.
-    pub(super) seed: Option<u64>,
 }
 
 /// Reads, places and joins the scans, with a note for all that had to be guessed; or takes a scene

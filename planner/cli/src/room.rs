@@ -12,8 +12,8 @@ use nullsweep_surface::room::{Plane, PlaneKind, Room, Segment};
 use nullsweep_surface::{CleanConfig, PlacedScan, scan};
 
 use crate::bars::Bars;
+use crate::floor::Placed;
 use crate::numbers::Numbers;
-use crate::placed::Placed;
 use crate::table::TABLE_TOP;
 
 /// A level plane this near to height 0 is the floor that every scene has. [m]

@@ -47,7 +47,8 @@ pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     table.add_rows(rows(&room));
     println!("{table}");
     if let Some(path) = &args.out {
-        SceneFile::of(path, &args.placed, &args.scans, &found, &room, args.seed)?.write(path)?;
+        SceneFile::of(path, args.placed.scale, &args.scans, &found, &room, args.seed)?
+            .write(path)?;
         println!("scene: {}", path.display());
     }
     if let Some(path) = &args.report {

@@ -7,8 +7,8 @@ use nullsweep_surface::room::Room;
 use nullsweep_surface::{PlacedScan, Placement, ReadOptions, scan};
 use serde::{Deserialize, Serialize};
 
+use crate::floor::Placed;
 use crate::numbers::isometry;
-use crate::placed::{Placed, PlacedArgs};
 use crate::room::name;
 
 /// A scene file: all in the floor frame, in metres.
@@ -61,10 +61,10 @@ struct ObjectEntry {
 }
 
 impl SceneFile {
-    /// The file of a room, to be written at `path`.
+    /// The file of a room whose scans were read by a `scale`, to be written at `path`.
     pub(super) fn of(
         path: &Path,
-        args: &PlacedArgs,
+        scale: f64,
         scans: &[PathBuf],
         placed: &Placed,
         room: &Room,
@@ -79,7 +79,7 @@ impl SceneFile {
             scan.push(ScanEntry {
                 file: near.map_or_else(|| file.clone(), Path::to_path_buf),
                 points: view.points.len(),
-                scale: args.scale,
+                scale,
                 pose: [t.x, t.y, t.z, r.x, r.y, r.z, r.w],
                 sensor: view.sensor.map(Into::into),
             });
@@ -150,7 +150,7 @@ mod tests {
 
     use super::*;
     use crate::bars::Bars;
-    use crate::placed::{Gravity, read_scans};
+    use crate::placed::{Gravity, PlacedArgs, read_scans};
 
     #[derive(Parser)]
     struct Line {
@@ -172,7 +172,7 @@ mod tests {
         let found = read_scans(&args, &scans, 1, Gravity::Given, &bars).expect("a scan");
         let path = folder.path().join("scene.toml");
         let room = Room::find(&found.scan, 1);
-        let file = SceneFile::of(&path, &args, &scans, &found, &room, 7).expect("a file");
+        let file = SceneFile::of(&path, args.scale, &scans, &found, &room, 7).expect("a file");
         assert_eq!(file.scan[0].file, Path::new("floor.xyz"), "from the file's folder on");
         file.write(&path).expect("written");
 
