@@ -37,6 +37,8 @@ pub struct Bed {
     highest: f64,
     /// Cosine of the largest angle between the pad's axis and the normal under its centre.
     facing: f64,
+    /// How far before the line that it is led along the pad's centre is; negative: behind. \[m\]
+    stand_off: f64,
 }
 
 impl Bed {
@@ -51,7 +53,8 @@ impl Bed {
         let (surface, radius) = (Surface::new(surface), 0.5 * tool.length.max(tool.width));
         let grid = Grid::new(&points, radius);
         let facing = tool.reach_angle.cos();
-        Self { surface, points, grid, radius, deepest, highest, facing }
+        let stand_off = tool.stand_off;
+        Self { surface, points, grid, radius, deepest, highest, facing, stand_off }
     }
 
     /// A surface into which the pad may be pressed as deep as it likes, in any direction.
@@ -59,7 +62,8 @@ impl Bed {
     pub fn soft(surface: Surface) -> Self {
         let (points, grid) = (Vec::new(), Grid::new(&[], 1.0));
         let deepest = f64::INFINITY;
-        Self { surface, points, grid, radius: 0.0, deepest, highest: 0.0, facing: -1.0 }
+        let (highest, facing, stand_off) = (0.0, -1.0, 0.0);
+        Self { surface, points, grid, radius: 0.0, deepest, highest, facing, stand_off }
     }
 
     /// The surface as it is.
@@ -81,7 +85,7 @@ impl Bed {
     #[must_use]
     pub fn raised(&self, patch: Patch) -> Patch {
         let own = self.surface.normal_near(&patch.centre).unwrap_or(patch.normal);
-        let faces = |normal: &UnitVector3<f64>| normal.dot(&own) >= self.facing;
+        let faces = |normal: &UnitVector3<f64>| self.faces(&patch.centre, normal);
         let upright = if faces(&patch.normal) { patch.normal } else { own };
         let over = |normal| self.over(&SurfacePoint { point: patch.centre, normal });
         let mut best = (over(upright).max(0.0), upright);
@@ -139,15 +143,21 @@ impl Bed {
 
     /// Whether the pad would sweep the points under its centre.
     fn faces_along(&self, line: &[SurfacePoint]) -> bool {
-        let faces = |point: &Point3<f64>, axis: &Vector3<f64>| {
-            let own = self.surface.normal_near(point);
-            own.is_none_or(|own| axis.dot(&own) >= self.facing * axis.norm())
-        };
         line.windows(2).all(|w| {
             let middle = nalgebra::center(&w[0].point, &w[1].point);
             let between = w[0].normal.into_inner() + w[1].normal.into_inner();
-            faces(&middle, &between) && faces(&w[1].point, &w[1].normal)
+            self.faces(&middle, &UnitVector3::new_normalize(between))
+                && self.faces(&w[1].point, &w[1].normal)
         })
+    }
+
+    /// Whether a pad that is led through `point` would sweep what is there, and what is where its
+    /// centre comes to be.
+    fn faces(&self, point: &Point3<f64>, axis: &UnitVector3<f64>) -> bool {
+        let centre = point + axis.scale(self.stand_off);
+        [*point, centre]
+            .iter()
+            .all(|at| self.surface.normal_near(at).is_none_or(|own| axis.dot(&own) >= self.facing))
     }
 
     /// How far a pad with its centre here, already so far `off` the surface, has to be raised along
