@@ -5,12 +5,16 @@ use std::io::Cursor;
 use e57::{CartesianCoordinate, E57Reader, Transform};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 
-use super::error::{Malformed, Place, malformed};
+use super::error::{Malformed, Place, guarded, malformed};
 use super::parsed::Parsed;
 use super::warning::ScanWarning;
 
 /// Reads all scans of the file, each at its pose; records without a valid point are left out.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
+    guarded(|| read(bytes))
+}
+
+fn read(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let wrong = |error: e57::Error| Malformed { place: Place::File, cause: error.to_string() };
     let mut file = E57Reader::new(Cursor::new(bytes)).map_err(wrong)?;
     let mut parsed = Parsed::default();

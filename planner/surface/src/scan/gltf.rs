@@ -10,7 +10,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Matrix4, Point3};
 
-use super::error::{Malformed, Place, malformed};
+use super::error::{Malformed, Place, guarded, malformed};
 use super::parsed::Parsed;
 use super::warning::ScanWarning;
 
@@ -20,6 +20,10 @@ const HEAD: usize = 12;
 /// Reads the triangles and points of the default scene, or of the first; buffers in files of their
 /// own lie beside `path`.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Parsed, Malformed> {
+    guarded(|| read(bytes, path))
+}
+
+fn read(bytes: &[u8], path: &Path) -> Result<Parsed, Malformed> {
     let wrong = |error: ::gltf::Error| Malformed { place: Place::File, cause: error.to_string() };
     let announced = bytes.get(8..HEAD).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if bytes.starts_with(b"glTF") && announced.is_none_or(|n| (n as usize) < HEAD) {

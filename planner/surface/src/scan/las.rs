@@ -5,7 +5,7 @@ use std::io::Cursor;
 use las::Reader;
 use nalgebra::Point3;
 
-use super::error::{Malformed, Place, malformed};
+use super::error::{Malformed, Place, guarded, malformed};
 use super::parsed::Parsed;
 use super::warning::ScanWarning;
 
@@ -16,6 +16,10 @@ const MAP: f64 = 1e4;
 
 /// Reads the points, offset and scale applied.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
+    guarded(|| read(bytes))
+}
+
+fn read(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let wrong = |error: las::Error| Malformed { place: Place::File, cause: error.to_string() };
     check_chunks(bytes)?;
     let mut file = Reader::new(Cursor::new(bytes.to_vec())).map_err(wrong)?;
