@@ -87,8 +87,8 @@ fn an_obstacle_may_have_any_shape_that_a_urdf_has() {
     let tip = arm.tip_pose(&arm.home());
     let folder = tempfile::tempdir().unwrap();
     write_blob(&folder.path().join("blob.stl"), Vector3::repeat(0.1), Vector3::zeros(), 5);
-    let mut options = Options::default();
-    options.meshes = MeshPaths::of_machine(folder.path(), [].into());
+    let meshes = MeshPaths::of_machine(folder.path(), [].into());
+    let options = Options { meshes, ..Options::default() };
     for shape in [
         Geometry::Box { half_extents: Vector3::repeat(0.1) },
         Geometry::Sphere { radius: 0.1 },
