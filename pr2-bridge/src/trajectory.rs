@@ -3,7 +3,6 @@
 use nullsweep_bridge::{Goal, Message, Point};
 use nullsweep_ipc_types::ports::now_ns;
 
-use crate::endpoint::DOF;
 use crate::link::msgs::{control_msgs, trajectory_msgs};
 use crate::link::ros_time;
 
@@ -13,7 +12,7 @@ pub fn trajectory(message: &Message, names: &[String]) -> trajectory_msgs::Joint
     out.header.seq = message.sequence;
     out.header.stamp = ros_time(message.start_ns);
     out.joint_names = names.to_vec();
-    out.points = message.points.iter().map(|p| point(p, true)).collect();
+    out.points = message.points.iter().map(|p| point(p, names.len(), true)).collect();
     out
 }
 
@@ -25,19 +24,20 @@ pub fn action_goal(goal: &Goal, names: &[String]) -> control_msgs::FollowJointTr
     out.goal_id.id = goal.id.clone();
     out.goal.trajectory.header.stamp = ros_time(goal.start_ns);
     out.goal.trajectory.joint_names = names.to_vec();
-    out.goal.trajectory.points = goal.points.iter().map(|p| point(p, goal.curved)).collect();
+    out.goal.trajectory.points =
+        goal.points.iter().map(|p| point(p, names.len(), goal.curved)).collect();
     out
 }
 
-/// A point; without velocities the controller goes straight.
-fn point(point: &Point, curved: bool) -> trajectory_msgs::JointTrajectoryPoint {
+/// A point of so many joints; without velocities the controller goes straight.
+fn point(point: &Point, dof: usize, curved: bool) -> trajectory_msgs::JointTrajectoryPoint {
     let time_from_start = roslibrust::codegen::integral_types::Duration {
         sec: (point.after_ns / 1_000_000_000) as i32,
         nsec: (point.after_ns % 1_000_000_000) as i32,
     };
     trajectory_msgs::JointTrajectoryPoint {
-        positions: point.q[..DOF].to_vec(),
-        velocities: if curved { point.v[..DOF].to_vec() } else { Vec::new() },
+        positions: point.q[..dof].to_vec(),
+        velocities: if curved { point.v[..dof].to_vec() } else { Vec::new() },
         time_from_start,
         ..Default::default()
     }

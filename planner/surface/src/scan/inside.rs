@@ -6,6 +6,8 @@ use super::winding::Wound;
 
 /// How far apart they are, but for solids of more than some cubic metres. \[m\]
 const APART: f64 = 0.02;
+/// How far its lines are off the middles of its cells along x and y, by its step.
+const ASIDE: [f64; 2] = [1.7e-4, 1e-4];
 /// Most places in one file.
 const MOST: f64 = 500_000.0;
 
@@ -32,9 +34,9 @@ pub(super) fn fill(vertices: &[Point3<f64>], wound: &Wound) -> Vec<Point3<f64>> 
     if !apart.is_finite() {
         return Vec::new();
     }
-    // Upright lines through the middles of a grid's cells, a little aside: no mesh that people draw
-    // has its edges there.
-    let line = |axis: usize, k: usize| low[axis] + (k as f64 + 0.5) * apart + 1e-4 * apart;
+    // Upright lines through the middles of a grid's cells, a little aside, along x more than along y:
+    // no mesh that people draw has its edges or its diagonals there.
+    let line = |axis: usize, k: usize| low[axis] + (k as f64 + 0.5 + ASIDE[axis]) * apart;
     let [columns, rows] = [0, 1].map(|axis| (size[axis] / apart).ceil() as usize);
     let range = |least: f64, most: f64, axis: usize, count: usize| {
         let first = ((least - low[axis]) / apart - 0.6).max(0.0) as usize;
