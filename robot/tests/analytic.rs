@@ -7,11 +7,13 @@ use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Solutions};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// An arm whose joints turn about z of frames that are each moved and turned from the one before.
+/// An arm whose joints turn about z of frames that are each moved and turned from the one before, and
+/// may be anywhere in these ranges: its hard limits are 0.01 rad farther out.
 fn serial(frames: &[[f64; 6]], ranges: &[(f64, f64)]) -> Arm {
     let mut text = String::from("<robot name='test'><link name='l0'/>");
     for (i, ([x, y, z, roll, pitch, yaw], (lower, upper))) in frames.iter().zip(ranges).enumerate()
     {
+        let (lower, upper) = (lower - 0.01, upper + 0.01);
         text += &format!(
             "<link name='l{next}'/><joint name='j{next}' type='revolute'><parent link='l{i}'/>\
              <child link='l{next}'/><origin xyz='{x} {y} {z}' rpy='{roll} {pitch} {yaw}'/>\

@@ -101,7 +101,8 @@ impl State {
     }
 
     /// Waits for a sound endpoint that answers; meanwhile commands where the arm is, so that
-    /// nothing jumps.
+    /// nothing jumps. An endpoint may follow before its answer is here: once near enough to begin,
+    /// the command stands, or a loaded arm sinks after its own sag.
     fn initialise(&mut self, bad: Option<Fault>, now_ns: u64, guard: &Guard) {
         let clock = self.watch.is_refusing(now_ns, guard).then_some(Fault::Clock);
         let Some(measured) = self.watch.newest else {
@@ -109,7 +110,8 @@ impl State {
             return;
         };
         if self.has_position {
-            self.creep(&measured.q, 0.0, guard);
+            let near = if self.is_off() { 0.0 } else { HELD_WITHIN };
+            self.creep(&measured.q, near, guard);
         } else {
             self.q = measured.q;
             self.has_position = true;

@@ -181,7 +181,7 @@ fn wrong_usage_is_told_with_its_own_code() {
         (["run", "--stale-ms", "nan"], "--stale-ms must be a positive number"),
         (["run", "--following-lag", "11"], "--following-lag must be from 0 to 10"),
         (["run", "--min-rate", "1.5"], "--min-rate must be from 0 to 1"),
-        (["run", "--arm", "middle"], "--arm takes right, left or BASE:TIP"),
+        (["run", "--arm", "middle"], "--arm <ARM>': right, left or BASE,TIP (two links) is wanted"),
     ] {
         let ended = command(&arguments, Stdio::piped()).output().unwrap();
         let text = String::from_utf8_lossy(&ended.stderr);

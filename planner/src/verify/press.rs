@@ -124,8 +124,12 @@ mod tests {
         let flat = press(&scene, &[pad(0.0, 0.0)], &tool);
         assert!((flat.press_max_m - 0.004).abs() < 1e-12 && flat.facing_max_rad < 1e-6);
         assert_eq!(flat.touching_p50, 1.0);
-        let hovering = press(&scene, &[pad(0.003, 0.0)], &tool);
-        assert!((hovering.press_max_m - 0.001).abs() < 1e-12 && hovering.touching_p50 < 0.01);
+        // A sponge that is pressed in stands out before its plane by as much, and no more.
+        let near = press(&scene, &[pad(0.003, 0.0)], &tool);
+        assert!((near.press_max_m - 0.001).abs() < 1e-12 && near.touching_p50 == 1.0);
+        let hovering = press(&scene, &[pad(tool.hover() + 0.001, 0.0)], &tool);
+        assert!(hovering.press_max_m == 0.0 && hovering.touching_p50 < 0.01);
+        assert!(hovering.touching_p50 > 0.0, "the ridge is touched");
         let tilted = press(&scene, &[pad(0.0, 0.2)], &tool);
         assert!((tilted.facing_max_rad - 0.2).abs() < 1e-9);
         assert!(tilted.press_max_m > 0.005, "{}", tilted.press_max_m);

@@ -123,7 +123,7 @@ pub(crate) fn cases() -> Vec<Case> {
         Case { scene: Some(higher), ..case("a floor 10 cm higher", low(), 3, "obstacle floor") },
         case("the hand in the body", across, 2, "l_shoulder_pan_link"),
         case("the arm folded", folded, 3, "r_forearm_link"),
-        case("the sponge dragged along", dragged, from, "sponge is"),
+        case("the sponge dragged along", dragged, from, "scan point"),
         Case {
             scene: Some(in_the_torso),
             ..case("a pillar where the robot stands", s.bang.clone(), 0, "obstacle pillar")
