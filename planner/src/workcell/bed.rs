@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3};
 use nullsweep_robot::Tool;
 use nullsweep_surface::{Grid, Patch, Surface, SurfacePoint};
 
@@ -198,6 +198,7 @@ fn tilts(normal: &UnitVector3<f64>) -> impl Iterator<Item = UnitVector3<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
     use nullsweep_surface::Scan;
 
     use super::*;
