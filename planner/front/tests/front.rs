@@ -2,17 +2,21 @@
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::LazyLock;
 
 use clap::Arg;
 use nullsweep_cell::Described;
 use tempfile::TempDir;
 
 /// A folder with the front and all that it starts: each prints its name and arguments, and ends with 7.
-fn folder() -> TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::copy(env!("CARGO_BIN_EXE_nullsweep"), folder.path().join("nullsweep")).expect("copied");
+/// Made before anything is started: a file that is being written cannot be run, also where a process
+/// that was started meanwhile holds it open.
+static PROGRAMS: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("front");
+    fs::create_dir_all(&folder).expect("a folder");
+    fs::copy(env!("CARGO_BIN_EXE_nullsweep"), folder.join("nullsweep")).expect("copied");
     let planner = clap::Command::new("planner").subcommand(
         clap::Command::new("plan").arg(Arg::new("hurry").long("hurry").help("Be quick.")),
     );
@@ -26,15 +30,20 @@ fn folder() -> TempDir {
             "#!/bin/sh\nif [ \"$1\" = __describe ]; then echo '{told}'; exit; fi\n\
              if [ \"$1\" = --version ]; then echo {name} 0.0.1; exit; fi\necho {name}: \"$@\"\nexit 7\n"
         );
-        let path = folder.path().join(name);
+        let path = folder.join(name);
         fs::write(&path, text).expect("written");
         fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a script");
     }
     folder
+});
+
+/// A folder to work in.
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a folder")
 }
 
 fn front(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
-    let program = folder.join("nullsweep");
+    let program = PROGRAMS.join("nullsweep");
     let Output { status, stdout, stderr } = Command::new(program)
         .args(args)
         .current_dir(folder)
