@@ -283,7 +283,7 @@ fn a_controller_that_splices_on_arrival_goes_on_as_it_did() {
     for (latency, lost) in [(0, 0), (3, 0), (4, 3), (12, 2), (25, 0)] {
         let mut stream = Stream::new(Rules { takeover: Takeover::AtArrival, ..rules() });
         let mut controller = Jtc::default();
-        let (mut on_the_way, mut sent) = (std::collections::VecDeque::new(), 0u64);
+        let (mut on_the_way, mut sent) = (VecDeque::new(), 0u64);
         let (mut before, mut steepest, mut farthest) = ([0.0; 2], 0.0f64, 0.0f64);
         for k in 1..=4000u64 {
             let now = (1000 + k) * MS;
