@@ -9,8 +9,8 @@ use super::error::{Malformed, Place, guarded, malformed};
 use super::parsed::Parsed;
 use super::warning::ScanWarning;
 
-/// Points that are read at a time: no more is set aside than a file may hold.
-const BLOCK: u64 = 1 << 16;
+/// About as many bytes of points are read at a time.
+const BLOCK: u64 = 1 << 22;
 /// Coordinates beyond this are a map's. \[m\]
 const MAP: f64 = 1e4;
 
@@ -23,9 +23,21 @@ fn read(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let wrong = |error: las::Error| Malformed { place: Place::File, cause: error.to_string() };
     check_chunks(bytes)?;
     let mut file = Reader::new(Cursor::new(bytes.to_vec())).map_err(wrong)?;
+    // What it says of itself sizes what is set aside for it.
+    let (count, record) =
+        (file.header().number_of_points(), u64::from(file.header().point_format().len()));
+    let held = bytes.len() as u64;
+    let is_packed = file.header().point_format().is_compressed;
+    if record > held || !is_packed && count.saturating_mul(record) > held {
+        return malformed(
+            Place::File,
+            format!("{count} points of {record} bytes each in a file of {held} bytes"),
+        );
+    }
+    let at_a_time = (BLOCK / record.max(1)).max(1);
     let mut parsed = Parsed::default();
     loop {
-        let block = file.read_points(BLOCK).map_err(wrong)?;
+        let block = file.read_points(at_a_time).map_err(wrong)?;
         if block.is_empty() {
             break;
         }
@@ -100,6 +112,21 @@ mod tests {
         assert_eq!(packed.points, plain.points);
         let map = parse(&file(false, 4.5e5)).unwrap();
         assert!(map.warnings[0].to_string().contains("450000"), "{:?}", map.warnings);
+    }
+
+    /// Nothing is set aside for what cannot be there: records of 60,000 bytes, or 4 billion of them.
+    #[test]
+    fn what_a_file_says_of_itself_is_held_against_its_size() {
+        for compressed in [false, true] {
+            let mut long = file(compressed, 0.0);
+            long[105..107].copy_from_slice(&59_904u16.to_le_bytes());
+            let error = parse(&long).unwrap_err();
+            assert!(error.cause.contains("points of 59904 bytes each"), "{error:?}");
+        }
+        let mut many = file(false, 0.0);
+        many[107..111].copy_from_slice(&u32::MAX.to_le_bytes());
+        let error = parse(&many).unwrap_err();
+        assert!(error.cause.starts_with("4294967295 points of 20 bytes"), "{error:?}");
     }
 
     #[test]
