@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use nullsweep_bridge::{Takeover, Timing};
 use nullsweep_ipc_types::service::DEFAULT_ROBOT;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
@@ -41,27 +41,16 @@ pub enum Splice {
     Stamp,
 }
 
-/// An arm of the PR2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ArmSide {
-    /// The left one.
-    Left,
-    /// The right one.
-    Right,
-}
-
 /// Which arm.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ArmArgs {
     /// The robot's URDF; without it the PR2
-    #[arg(long, requires = "chain")]
+    #[arg(long, requires = "arm")]
     pub urdf: Option<PathBuf>,
-    /// The arm's first and last link in the URDF, as BASE,TIP
-    #[arg(long, value_name = "BASE,TIP", requires = "urdf")]
-    pub chain: Option<String>,
-    /// Which arm of the PR2
-    #[arg(long, value_enum, default_value = "right", conflicts_with = "urdf")]
-    pub arm: ArmSide,
+    /// The arm: right or left of the PR2, else its first and last link in the URDF, BASE,TIP;
+    /// without it the PR2's right
+    #[arg(long, value_name = "ARM")]
+    pub arm: Option<ArmSpec>,
     /// What ROS calls a joint that has another name in the URDF, as URDF=ROS; may be repeated
     #[arg(long, value_name = "URDF=ROS", value_parser = renaming)]
     pub rename: Vec<(String, String)>,
@@ -161,17 +150,12 @@ impl Common {
 impl ArmArgs {
     /// The arm as its URDF has it.
     pub fn load(&self) -> anyhow::Result<Arm> {
-        let Some(path) = &self.urdf else {
-            let side = match self.arm {
-                ArmSide::Left => Side::Left,
-                ArmSide::Right => Side::Right,
-            };
-            return Ok(Robot::pr2().arm(&ArmSpec::pr2(side))?);
+        let robot = match &self.urdf {
+            Some(path) => Robot::from_urdf_file(path)?,
+            None => Robot::pr2(),
         };
-        let chain = self.chain.as_deref().unwrap_or_default();
-        let (base, tip) = chain.split_once(',').context("--chain is BASE,TIP")?;
-        let spec = ArmSpec { base: base.trim().into(), tip: tip.trim().into() };
-        Ok(Robot::from_urdf_file(path)?.arm(&spec)?)
+        let right = ArmSpec::pr2(Side::Right);
+        Ok(robot.arm(self.arm.as_ref().unwrap_or(&right))?)
     }
 
     /// What ROS calls each joint.
@@ -281,8 +265,11 @@ mod tests {
     }
 
     #[test]
-    fn a_urdf_needs_its_chain() {
+    fn a_urdf_needs_its_arm_and_an_arm_its_urdf() {
         assert!(parse(&["--urdf", "arm.urdf"]).is_err());
-        assert!(parse(&["--chain", "base,tip"]).is_err());
+        assert!(parse(&["--arm", "base"]).is_err());
+        assert!(parse(&["--arm", "base,tip"]).expect("an arm").arm.load().is_err());
+        let left = parse(&["--arm", "left"]).expect("an arm").arm.load().expect("the PR2's");
+        assert_eq!(*left.spec(), ArmSpec::pr2(Side::Left));
     }
 }

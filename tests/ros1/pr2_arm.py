@@ -96,10 +96,10 @@ ActionResult = message_type(
     ],
 )
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "ros"))
+from arm import Arm  # noqa: E402  (its folder is named above)
+
 CYCLE = 0.002
-LAG = 0.015
-# More than any joint's acceleration: what the velocity changes beyond it is a jump. [rad/s²]
-MOST = 10.0
 
 
 class Segment:
@@ -129,21 +129,18 @@ class Segment:
         return q, v
 
 
-class Arm:
+class Controller(Arm):
     """The controller and the arm behind it."""
 
     def __init__(self, names, start, continuous):
         self.names, self.continuous = names, continuous
         self.lock = threading.Lock()
-        self.measured = list(start)
-        self.speed = [0.0] * len(start)
-        self.last = (list(start), [0.0] * len(start))
+        super().__init__(start)
+        self.seen["preempted"] = 0
         self.goal = None
         self.goal_end = 0.0
         self.halted = False
         self.mute, self.age = False, 0.0
-        self.seen = {"messages": 0, "goals": 0, "preempted": 0, "late": 0, "dropped": 0,
-                     "lost": 0, "step": 0.0, "velocity_step": 0.0, "largest_error": 0.0}
         self.sequence = None
         self.hold()
 
@@ -152,7 +149,7 @@ class Arm:
         with self.lock:
             self.halted = halted
             self.hold()
-            self.last = (list(self.measured), [0.0] * len(self.measured))
+            self.stand()
 
     def hold(self):
         q = list(self.measured)
@@ -204,24 +201,10 @@ class Arm:
         """One cycle of the controller."""
         with self.lock:
             if self.halted:
-                self.speed = [0.0] * len(self.measured)
+                self.rest()
                 return None
             q, v = self.desired(now)
-            # Steps beyond what the velocity explains, and of the velocity itself.
-            for j in range(len(q)):
-                way = abs(q[j] - self.last[0][j])
-                most = max(abs(v[j]), abs(self.last[1][j])) * self.elapsed
-                self.seen["step"] = max(self.seen["step"], way - most)
-                change = abs(v[j] - self.last[1][j]) - MOST * self.elapsed
-                self.seen["velocity_step"] = max(self.seen["velocity_step"], change)
-                error = abs(q[j] - self.measured[j])
-                self.seen["largest_error"] = max(self.seen["largest_error"], error)
-            self.last = (q, v)
-            share = 1.0 - math.exp(-self.elapsed / LAG)
-            for j in range(len(q)):
-                before = self.measured[j]
-                self.measured[j] += share * (q[j] + LAG * v[j] - self.measured[j])
-                self.speed[j] = (self.measured[j] - before) / self.elapsed
+            self.follow(q, v)
             # What has ended long ago is forgotten.
             while len(self.segments) > 1 and self.segments[1].start < now - 1.0:
                 self.segments.pop(0)
@@ -241,7 +224,7 @@ def main():
     names = plan["joints"]
     start = plan["knots"][0]["q"][: len(names)]
     held = [(joint["name"], joint["position"]) for joint in plan["held"]]
-    arm = Arm(names, start, ["roll_joint" in n and "upper" not in n for n in names])
+    arm = Controller(names, start, ["roll_joint" in n and "upper" not in n for n in names])
 
     try:
         # A real controller has its time; every thread inherits it.

@@ -42,10 +42,10 @@ from std_msgs.msg import Bool, Float64MultiArray
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "ros"))
+from arm import Arm  # noqa: E402  (its folder is named above)
+
 CYCLE = 0.002
-LAG = 0.015
-# More than any joint's acceleration: what the velocity changes beyond it is a jump. [rad/s²]
-MOST = 10.0
 
 
 def between(a, b, now):
@@ -69,18 +69,14 @@ def between(a, b, now):
     return q, v
 
 
-class Controller:
+class Controller(Arm):
     """What it aims at, and the arm behind it."""
 
     def __init__(self, names, start, turns, at_stamp):
         self.names, self.turns, self.at_stamp = names, turns, at_stamp
         self.lock = threading.Lock()
-        self.measured, self.speed = list(start), [0.0] * len(start)
-        self.last = (list(start), [0.0] * len(start))
+        super().__init__(start)
         self.active, self.powered, self.lose = True, True, 0
-        self.elapsed = CYCLE
-        self.seen = {"messages": 0, "goals": 0, "late": 0, "dropped": 0, "lost": 0, "step": 0.0,
-                     "velocity_step": 0.0, "largest_error": 0.0}
         self.number = None
         self.hold(list(start))
 
@@ -96,7 +92,7 @@ class Controller:
             self.active = self.active if active is None else active
             self.powered = self.powered if powered is None else powered
             self.hold(list(self.measured))
-            self.last = (list(self.measured), [0.0] * len(self.measured))
+            self.stand()
 
     def desired(self, now):
         """By the point before and the point after."""
@@ -172,26 +168,13 @@ class Controller:
         """One cycle of the controller."""
         with self.lock:
             if not self.works():
-                self.speed = [0.0] * len(self.measured)
+                self.rest()
                 return
             q, v = self.desired(now)
             if straight:
                 # Positions alone: their velocity is what they show.
                 v = [(a - b) / self.elapsed for a, b in zip(q, self.last[0])]
-            for j in range(len(q)):
-                way = abs(q[j] - self.last[0][j])
-                most = max(abs(v[j]), abs(self.last[1][j])) * self.elapsed
-                self.seen["step"] = max(self.seen["step"], way - most)
-                change = abs(v[j] - self.last[1][j]) - MOST * self.elapsed
-                self.seen["velocity_step"] = max(self.seen["velocity_step"], change)
-                error = abs(q[j] - self.measured[j])
-                self.seen["largest_error"] = max(self.seen["largest_error"], error)
-            self.last = (q, v)
-            share = 1.0 - math.exp(-self.elapsed / LAG)
-            for j in range(len(q)):
-                before = self.measured[j]
-                self.measured[j] += share * (q[j] + LAG * v[j] - self.measured[j])
-                self.speed[j] = (self.measured[j] - before) / self.elapsed
+            self.follow(q, v)
 
 
 def main():

@@ -1,7 +1,5 @@
 //! The way from a plan's last stop to where it leaves the arm.
 
-use nullsweep_robot::JointVector;
-
 use super::attempt::Planning;
 use super::job::End;
 use crate::motion::{jump, retract};
@@ -31,14 +29,7 @@ impl Planning<'_> {
             );
             return;
         };
-        let free = |q: &JointVector| PlanKnot {
-            time_ns: 0,
-            q: *q,
-            v: JointVector::ZERO,
-            line: None,
-            patch: None,
-        };
-        plan.knots.extend(way[1..].iter().map(free));
+        plan.knots.extend(way[1..].iter().map(|q| PlanKnot::free(*q)));
         timing::set_times(&mut plan.knots, &self.velocity);
     }
 }

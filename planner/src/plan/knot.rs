@@ -22,6 +22,14 @@ pub struct PlanKnot {
     pub patch: Option<u32>,
 }
 
+impl PlanKnot {
+    /// At a joint vector, off the surface, before it has a time and a speed.
+    #[must_use]
+    pub(crate) fn free(q: JointVector) -> Self {
+        Self { time_ns: 0, q, v: JointVector::ZERO, line: None, patch: None }
+    }
+}
+
 fn is_zero(v: &JointVector) -> bool {
     *v == JointVector::default()
 }

@@ -153,14 +153,7 @@ fn assemble(
     way: &[JointVector],
 ) -> Plan {
     let Workcell { arm, tool, world } = cell;
-    let free = |q: &JointVector| PlanKnot {
-        time_ns: 0,
-        q: *q,
-        v: JointVector::ZERO,
-        line: None,
-        patch: None,
-    };
-    let mut knots: Vec<PlanKnot> = way.iter().map(free).collect();
+    let mut knots: Vec<PlanKnot> = way.iter().map(|q| PlanKnot::free(*q)).collect();
     knots.dedup_by(|b, a| a.q == b.q);
     // Where it ends on the surface, the pad may touch while it is set down.
     if let Some(last) = knots.last_mut()
