@@ -19,7 +19,7 @@ pub struct Clearance {
 
 impl Exact {
     /// The clearance at a joint vector \[rad\] or \[m\]; what is farther than `reach` \[m\] counts
-    /// as that.
+    /// as that, and so is what a link stands on that meets it in every posture: it is not checked either.
     #[must_use]
     pub fn clearance(&self, q: &JointVector, reach: f64) -> Clearance {
         let scene = self.scene();
@@ -27,7 +27,10 @@ impl Exact {
         let mut least = vec![reach; poses.len()];
         for i in (0..poses.len()).filter(|&i| scene.moves[i] && !scene.parts[i].is_pad) {
             let shape = &*scene.parts[i].shape;
-            for obstacle in &scene.obstacles {
+            for (index, obstacle) in scene.obstacles.iter().enumerate() {
+                if scene.grounded.contains(&(i, index)) {
+                    continue;
+                }
                 let at = pose(&obstacle.pose);
                 least[i] = least[i].min(distance(&poses[i], shape, &at, &*obstacle.shape));
             }

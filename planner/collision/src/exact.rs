@@ -1,5 +1,7 @@
 //! The slow check: parry's shapes, every pair and every point, poses from the robot crate.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Point3;
 use nullsweep_robot::{Arm, JointVector, Robot, Tool};
 use parry3d_f64::bounding_volume::BoundingVolume;
@@ -70,6 +72,16 @@ impl Exact {
     #[must_use]
     pub fn guessed_links(&self) -> &[String] {
         &self.scene.guessed
+    }
+
+    /// The links that meet what carries the robot in every posture, each with what it meets: they are
+    /// not held against it.
+    #[must_use]
+    pub fn grounded_links(&self) -> BTreeSet<[String; 2]> {
+        let Scene { grounded, parts, obstacles, .. } = &self.scene;
+        let names =
+            |&(part, i): &(usize, usize)| [parts[part].name.clone(), obstacles[i].name.clone()];
+        grounded.iter().map(names).collect()
     }
 
     /// Whether everything keeps its margin at the joint vector `q`. \[rad\] or \[m\] One with NaN or ∞

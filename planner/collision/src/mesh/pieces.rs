@@ -1,7 +1,8 @@
 //! A mesh as convex pieces: cut by planes until no hull is much fatter than what it holds.
 //!
-//! A cut goes through the triangles, and both halves' hulls hold the cross-section between them, so
-//! that the pieces together hold all of the mesh and, where it is closed, of its inside.
+//! A cut goes through the triangles of a closed mesh and closes both halves again, so that the hull of
+//! each holds its part of the inside: between them the pieces hold all of the mesh and of what it
+//! encloses. An open mesh is closed first, as if a lid were on each of its openings.
 
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::math::Vec3;
@@ -33,8 +34,9 @@ struct Piece {
     fat: f64,
 }
 
-/// Sets of points whose convex hulls together hold the mesh; none is empty.
+/// Sets of points whose convex hulls together hold the mesh and its inside; none is empty.
 pub(crate) fn pieces(mesh: Soup) -> Vec<Vec<Point3<f64>>> {
+    let mesh = mesh.closed();
     let (Some(skin), Some(whole)) = (skin(&mesh), volume(&extremes(&mesh.vertices))) else {
         return vec![mesh.vertices];
     };

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// Triangles by their vertices' indices; in the mesh's frame. \[m\]
 #[derive(Clone, Debug, Default)]
@@ -40,8 +40,32 @@ impl Soup {
         self.triangles.iter().map(|triangle| triangle.map(|i| self.vertices[i]))
     }
 
+    /// With all its openings closed, so that each edge is of an even number of triangles: a fan closes
+    /// each border, from the middle of that border's vertices. What it encloses then is its inside.
+    pub(crate) fn closed(mut self) -> Self {
+        let mut edges: Vec<[usize; 2]> = self
+            .triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .filter(|[a, b]| a != b)
+            .collect();
+        edges.sort_unstable();
+        let is_odd = |edge: &&[[usize; 2]]| edge.len() % 2 == 1;
+        let border: Vec<[usize; 2]> =
+            edges.chunk_by(|a, b| a == b).filter(is_odd).map(|edge| edge[0]).collect();
+        for edges in connected(&border) {
+            let sum: Vector3<f64> =
+                edges.iter().flatten().map(|&corner| self.vertices[corner].coords).sum();
+            let middle = self.vertices.len();
+            self.vertices.push(Point3::from(sum / (2 * edges.len()) as f64));
+            self.triangles.extend(edges.iter().map(|[a, b]| [*a, *b, middle]));
+        }
+        self
+    }
+
     /// What is on the low and on the high side of the plane across an axis: triangles that it goes
-    /// through are cut.
+    /// through are cut. A closed mesh's halves are closed again, in the plane.
     pub(crate) fn cut(&self, axis: usize, at: f64) -> [Self; 2] {
         let side = |sign: f64| {
             let mut kept = Vec::new();
@@ -51,7 +75,7 @@ impl Soup {
                     kept.extend([clipped[0], clipped[i - 1], clipped[i]]);
                 }
             }
-            Self::of(kept)
+            Self::of(kept).closed()
         };
         [side(1.0), side(-1.0)]
     }
@@ -79,8 +103,39 @@ impl Soup {
     }
 }
 
-/// Where the line from `p` to `q` meets the plane across an axis.
+/// Edges by how they hang together.
+fn connected(edges: &[[usize; 2]]) -> Vec<Vec<[usize; 2]>> {
+    let mut at: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (i, edge) in edges.iter().enumerate() {
+        edge.iter().for_each(|&corner| at.entry(corner).or_default().push(i));
+    }
+    let mut is_taken = vec![false; edges.len()];
+    let mut groups = Vec::new();
+    for first in 0..edges.len() {
+        if std::mem::replace(&mut is_taken[first], true) {
+            continue;
+        }
+        let mut group = vec![edges[first]];
+        let mut next = 0;
+        while let Some(&edge) = group.get(next) {
+            next += 1;
+            for &other in edge.iter().flat_map(|corner| &at[corner]) {
+                if !std::mem::replace(&mut is_taken[other], true) {
+                    group.push(edges[other]);
+                }
+            }
+        }
+        groups.push(group);
+    }
+    groups
+}
+
+/// Where the line between two points meets the plane across an axis: the same for both triangles at
+/// an edge, to the bit.
 fn crossing(p: &Point3<f64>, q: &Point3<f64>, axis: usize, at: f64) -> Point3<f64> {
+    let order = |i: usize| p[i].total_cmp(&q[i]);
+    let is_first = order(0).then(order(1)).then(order(2)).is_lt();
+    let (p, q) = if is_first { (p, q) } else { (q, p) };
     let mut between = p + (q - p) * ((at - p[axis]) / (q[axis] - p[axis]));
     between[axis] = at;
     between

@@ -83,6 +83,114 @@ fn the_inside_of_a_closed_mesh_is_held_too() {
     }
 }
 
+/// How far the centre line of a bent tube is from its axis, and its wall from that line. \[m\]
+const BEND: [f64; 2] = [0.25, 0.06];
+/// Sides of its cross-section, and steps along it.
+const SIDES: usize = 24;
+const STEPS: usize = 40;
+
+/// A place of a tube that is bent by 270° and stands aslant, by turn along it, turn about its middle
+/// and distance from that. \[rad\], \[m\]
+fn in_tube(along: f64, about: f64, out: f64) -> Point3<f64> {
+    let off = BEND[0] + out * about.cos();
+    let p = Point3::new(off * along.cos(), off * along.sin(), out * about.sin());
+    nalgebra::Rotation3::from_euler_angles(0.7, 0.4, 0.3) * p
+}
+
+/// The tube's faces, with or without those at its ends.
+fn tube(has_ends: bool) -> Soup {
+    let ring = |i: usize| 1.5 * std::f64::consts::PI * i as f64 / STEPS as f64;
+    let about = |j: usize| std::f64::consts::TAU * (j % SIDES) as f64 / SIDES as f64;
+    let at = |i: usize, j: usize| in_tube(ring(i), about(j), BEND[1]);
+    let mut corners = Vec::new();
+    for j in 0..SIDES {
+        for i in 0..STEPS {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            corners.extend([a, b, c, a, c, d]);
+        }
+        for end in [0, STEPS].into_iter().filter(|_| has_ends) {
+            corners.extend([at(end, j), at(end, j + 1), in_tube(ring(end), 0.0, 0.0)]);
+        }
+    }
+    Soup::of(corners)
+}
+
+fn hulls_of(mesh: Soup) -> Vec<Hull> {
+    pieces(mesh).iter().map(|points| Hull::about(points).expect("not flat")).collect()
+}
+
+#[test]
+fn the_inside_of_a_bent_tube_is_held_with_and_without_its_ends() {
+    let mut rng = ChaCha8Rng::seed_from_u64(14);
+    for has_ends in [true, false] {
+        let hulls = hulls_of(tube(has_ends));
+        assert!(hulls.len() > 3, "{}", hulls.len());
+        for _ in 0..20_000 {
+            let along = rng.random_range(0.0..1.5 * std::f64::consts::PI);
+            let about = rng.random_range(0.0..std::f64::consts::TAU);
+            // Within the flat faces, which lie inside of the round wall.
+            let p = in_tube(along, about, 0.97 * BEND[1] * rng.random_range(0.0..1.0f64).sqrt());
+            assert!(hulls.iter().any(|hull| holds(hull, &p)), "{p}, ends: {has_ends}");
+        }
+    }
+}
+
+/// Cells of a solid, and the faces between what is filled and what is not; without those on top if
+/// it is open.
+fn blocks(seed: u64, is_open: bool) -> (Vec<[usize; 3]>, Soup) {
+    const SIDE: f64 = 0.1;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut filled = vec![[1usize, 1, 1]];
+    while filled.len() < 12 {
+        let mut next = filled[rng.random_range(0..filled.len())];
+        let axis = rng.random_range(0..3);
+        next[axis] =
+            if rng.random_range(0..2) == 0 { next[axis] + 1 } else { next[axis].max(1) - 1 };
+        if next[axis] < 4 && !filled.contains(&next) {
+            filled.push(next);
+        }
+    }
+    let top = filled.iter().map(|cell| cell[2]).max();
+    let mut corners = Vec::new();
+    for cell in &filled {
+        let low = cell.map(|i| SIDE * i as f64);
+        let faces = cuboid(low, cell.map(|i| SIDE * (i + 1) as f64));
+        for (k, face) in faces.chunks_exact(6).enumerate() {
+            // In the order of `cuboid`: along z, y, x, low before high.
+            let axis = 2 - k / 2;
+            let beside = if k % 2 == 1 { Some(cell[axis] + 1) } else { cell[axis].checked_sub(1) };
+            let mut other = *cell;
+            let covered = beside.is_some_and(|at| {
+                other[axis] = at;
+                filled.contains(&other)
+            });
+            if !covered && !(is_open && k == 1 && Some(cell[2]) == top) {
+                corners.extend_from_slice(face);
+            }
+        }
+    }
+    // Neighbouring cells have the same corners, to the bit.
+    let round = |p: Point3<f64>| p.map(|x| (x / SIDE).round() * SIDE);
+    (filled, Soup::of(corners.into_iter().map(round)))
+}
+
+#[test]
+fn the_inside_is_held_however_often_it_was_cut_along_all_three_axes() {
+    let mut rng = ChaCha8Rng::seed_from_u64(15);
+    for seed in 0..12 {
+        for is_open in [false, true] {
+            let (filled, mesh) = blocks(seed, is_open);
+            let hulls = hulls_of(mesh);
+            for _ in 0..5_000 {
+                let cell = filled[rng.random_range(0..filled.len())];
+                let p = cell.map(|i| 0.1 * (i as f64 + rng.random_range(0.0..1.0)));
+                let p = Point3::from(p);
+                assert!(hulls.iter().any(|hull| holds(hull, &p)), "{p} of {seed}, open: {is_open}");
+            }
+        }
+    }
+}
+
 #[test]
 fn what_is_hollow_is_cut_and_what_is_not_stays_whole() {
     let elbow = pieces(elbow());

@@ -183,4 +183,10 @@ fn what_meets_the_floor_in_every_posture_is_excused_by_name_and_nothing_else() {
         world.why_not(&arm.home(), ToolContact::Forbidden)
     );
     assert!(!at(-1.0), "the boom is in the floor");
+    let excused = world.exact().grounded_links();
+    assert!(excused.iter().eq([&["turret".to_owned(), "floor".to_owned()]]), "{excused:?}");
+    // Nor is it what there is least room to: the boom's lower side is.
+    let room = world.exact().clearance(&JointVector::ZERO, 1.0);
+    let least = room.arm.min(room.hand);
+    assert!((least - 0.18).abs() < 1e-9, "{room:?}");
 }
