@@ -72,6 +72,11 @@ fn a_camera_finds_which_way_is_up_and_how_high_it_is() {
         assert_eq!(level(&raw, None, seed), Ok(found));
     }
     let (raw, up) = seen(1);
+    // The same points, where their file says that no camera or a scanner elsewhere has seen them.
+    let unseen = level(&RawScan { sensor: None, ..raw.clone() }, None, 1).unwrap();
+    assert!(!unseen.camera && unseen.up.angle(&up) < 0.005);
+    let elsewhere = RawScan { sensor: Some(Point3::new(5.0, 6.0, 7.0)), ..raw.clone() };
+    assert!(!level(&elsewhere, Some(up), 1).unwrap().camera);
     let told = level(&raw, Some(up), 1).unwrap();
     assert!((told.height - 1.3).abs() < 0.01);
     // One that is a little wrong is taken at its word, and the plane's middle stays the support.

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use nullsweep_surface::{
-    CleanConfig, Grid, PatchConfig, Placement, ReadOptions, Scan, ScanError, patches, scan,
-    scan::Format, scan::ScanWarning, simulate, simulate::SimulatedView,
+    CleanConfig, Grid, PatchConfig, PlacedScan, Placement, ReadOptions, Scan, ScanError, patches,
+    scan, scan::Format, scan::ScanWarning, scan::View, simulate, simulate::SimulatedView,
 };
 
 /// The test data, or `None` with the reason printed.
@@ -149,6 +149,101 @@ fn a_mesh_without_a_sensor_has_outward_normals() {
     let lost =
         placed.views[0].points.iter().filter(|p| known.nearest(p, 0.015, |_| true).is_none());
     assert_eq!(lost.count(), 0);
+}
+
+/// A plate of half a metre and what else a scanner saw in its hall, without a sensor.
+fn hall(beside: impl IntoIterator<Item = Point3<f64>>) -> PlacedScan {
+    let at = |i: i32| 0.01 * f64::from(i);
+    let plate = (0..2500).map(|i| Point3::new(at(i % 50), at(i / 50), 1.0));
+    let points = plate.chain(beside).collect();
+    PlacedScan { views: vec![View { points, ..View::default() }] }
+}
+
+#[test]
+fn what_is_far_from_the_scan_is_in_the_way_and_not_to_be_swept() {
+    let far: Vec<Point3<f64>> =
+        (0..400).map(|i| Point3::new(40.0, f64::from(i % 20), 0.2 * f64::from(i / 20))).collect();
+    let near = Point3::new(0.25, 0.25, 1.4);
+    let placed = hall(far.iter().copied().chain([near]));
+    let (scan, report) = scan::clean(&placed, &CleanConfig::default()).unwrap();
+    let alone: Vec<&Point3<f64>> = scan.points.iter().filter(|p| p.z != 1.0).collect();
+    assert!(alone.contains(&&near));
+    assert!(scan.points.iter().all(|p| p.x < 1.0));
+    assert_eq!(report.single, 1);
+    assert_eq!(
+        report.kept - report.single + report.merged + report.outliers + report.loose,
+        report.points,
+        "{report:?}"
+    );
+    let rest = scan::measured(&placed, &scan).rest;
+    assert_eq!(rest, far);
+}
+
+#[test]
+fn single_points_do_not_go_beyond_the_most_that_there_may_be() {
+    let spray = (0..1000).map(|i| {
+        let at = |k: i32| 0.05 * f64::from(k);
+        Point3::new(at(i % 10), at(i / 10 % 10), 1.2 + 0.05 * f64::from(i / 100))
+    });
+    let placed = hall(spray);
+    let config = CleanConfig { max_points: 2700, ..CleanConfig::default() };
+    let (scan, report) = scan::clean(&placed, &config).unwrap();
+    assert!(scan.points.len() <= 2700, "{report:?}");
+    assert_eq!(report.kept, scan.points.len());
+    let measured = scan::measured(&placed, &scan);
+    assert_eq!(measured.raw.len() + measured.rest.len(), placed.len());
+}
+
+/// A file whose points are in their place already, with the sensor elsewhere than at its origin.
+#[test]
+fn a_scanner_stands_where_its_file_says() {
+    let head = "50\n50\n5 6 7\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 6 7 1\n";
+    let row =
+        |i: i32| format!("{} {} -2 0.5\n", 0.01 * f64::from(i % 50), 0.01 * f64::from(i / 50));
+    let one = head.to_owned() + &(0..2500).map(row).collect::<String>();
+    let read = |text: &str, scale: f64| {
+        let options = ReadOptions { scale, ..ReadOptions::default() };
+        scan::read_bytes(text.as_bytes(), Format::Ptx, Path::new("a.ptx"), &options).unwrap()
+    };
+    let raw = read(&one, 0.5);
+    assert_eq!((raw.sensor, raw.viewpoint), (Some(Point3::new(2.5, 3.0, 3.5)), None));
+    let raw = read(&one, 1.0);
+    // It looks down on what lies 2 m below it, in the file at z = 5.
+    let up = Vector3::z_axis();
+    let placement = Placement::UpAndHeight { up, sensor_height: 2.0, support_height: 0.5 };
+    let (placed, pose) = scan::place(&raw, &placement);
+    let view = &placed.views[0];
+    assert!(view.points.iter().all(|p| (p.z - 0.5).abs() < 1e-9));
+    let sensor = view.sensor.unwrap();
+    assert!((sensor - pose * Point3::new(5.0, 6.0, 7.0)).norm() < 1e-12);
+    let (scan, _) = scan::clean(&placed, &CleanConfig::default()).unwrap();
+    assert!(scan.normals.iter().all(|n| n.z > 0.9));
+    // What the library is told of the file's frame is not said twice.
+    let (placed, _) = scan::place(&raw, &Placement::Viewpoint);
+    assert_eq!(placed.views[0].points, raw.points);
+    assert_eq!(placed.views[0].sensor, raw.sensor);
+    let turned = Isometry3::rotation(Vector3::new(0.0, 0.0, 1.0));
+    let (placed, _) = scan::place(&raw, &Placement::SensorPose(turned));
+    assert_eq!(placed.views[0].sensor, raw.sensor.map(|at| turned * at));
+    // Of two scans nobody knows which point was seen from where.
+    let both = read(&(one.clone() + &one), 1.0);
+    assert_eq!(both.sensor, None);
+    for placement in [placement, Placement::Viewpoint, Placement::SensorPose(turned)] {
+        assert_eq!(scan::place(&both, &placement).0.views[0].sensor, None);
+    }
+}
+
+#[test]
+fn a_mesh_has_no_sensor() {
+    let mesh = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nv 5 5 5\n";
+    let options = ReadOptions::default();
+    let read =
+        |bytes: &[u8]| scan::read_bytes(bytes, Format::Obj, Path::new("a.obj"), &options).unwrap();
+    let raw = read(mesh);
+    assert_eq!(raw.sensor, None);
+    assert!(raw.warnings.contains(&ScanWarning::NoFace { points: 1 }));
+    let cloud: String = (0..100).map(|i| format!("v {i} 0 {}\n", i % 10)).collect();
+    assert_eq!(read(cloud.as_bytes()).sensor, Some(Point3::origin()));
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub struct Level {
     pub height: f64,
     /// How much was seen of that plane. \[m²\]
     pub area: f64,
-    /// Whether the origin is a camera: all points lie in its field of view.
+    /// Whether the origin is a camera: it may be one, and all points lie in its field of view.
     pub camera: bool,
 }
 
@@ -52,8 +52,11 @@ const BELOW: f64 = 0.03;
 /// # Errors
 /// [`LevelError::NoPlane`] where no such plane is there.
 pub fn level(raw: &RawScan, up: Option<UnitVector3<f64>>, seed: u64) -> Result<Level, LevelError> {
-    let view = field_of_view(&raw.points);
-    let noise = Noise { sensors: view.map(|_| Point3::origin()).into_iter().collect() };
+    // The points of a scanner that stood elsewhere are in no camera's frame.
+    let elsewhere = raw.sensor.is_some_and(|at| at != Point3::origin());
+    let view = field_of_view(&raw.points).filter(|_| !elsewhere);
+    let camera = view.is_some() && raw.sensor.is_some();
+    let noise = Noise { sensors: camera.then(Point3::origin).into_iter().collect() };
     let (thin, side) = flat::thin(&raw.points);
     let flats = flat::find(&thin, side, &noise, seed);
     let held = up.or(view).unwrap_or(Vector3::z_axis());
@@ -78,7 +81,7 @@ pub fn level(raw: &RawScan, up: Option<UnitVector3<f64>>, seed: u64) -> Result<L
     // Who says the direction says it exactly; the plane gives the height along it.
     let up = up.unwrap_or(*normal);
     let height = -flat.centroid.coords.dot(&up);
-    Ok(Level { up, height, area: flat.area, camera: view.is_some() })
+    Ok(Level { up, height, area: flat.area, camera })
 }
 
 /// The direction up of a camera that is held level, if all points lie in the field of view of one at

@@ -55,6 +55,8 @@ pub struct CleanReport {
     pub outliers: usize,
     /// Points left out of it because their neighbours form no surface.
     pub loose: usize,
+    /// Points kept that are among those left out of the surface: each is a thing by itself.
+    pub single: usize,
     /// The voxel used. \[m\]
     pub voxel: f64,
     /// The neighbourhood used. \[m\]
@@ -75,13 +77,16 @@ const EDGE_ANGLE: f64 = 0.45;
 /// outwards), then all points are smoothed on all views by a moving least squares fit that weighs
 /// neighbours by distance and by agreement of normals (as Öztireli, Guennebaud & Gross 2009). Of views
 /// without a sensor every point is a thing: those that the surface leaves out are there again at its
-/// end, as they were measured.
+/// end, as they were measured, within 20 m of the scan's middle and up to `max_points` in all. What is
+/// not among them is no part of the surface, but [`measured()`](super::measured()) all the same.
 ///
 /// # Errors
 /// [`ScanError::NoSurface`] when fewer than 15 points are left.
 pub fn clean(scan: &PlacedScan, config: &CleanConfig) -> Result<(Scan, CleanReport), ScanError> {
     let total = scan.len();
-    let mut samples = gather(scan);
+    let middle = middle(scan);
+    let belongs = |p: &Point3<f64>| (p - middle).norm() <= MAX_DISTANCE;
+    let mut samples = gather(scan, belongs);
     let near = samples.len();
     let voxel = merge(&mut samples, config.voxel, config.max_points);
     let merged = near - samples.len();
@@ -108,13 +113,16 @@ pub fn clean(scan: &PlacedScan, config: &CleanConfig) -> Result<(Scan, CleanRepo
     let smooth = merge_layers(&smooth, &normals, &points, voxel);
     let spacing = median_spacing(&smooth.points);
     let merged = merged + points.len() - smooth.points.len();
-    let scan = loose::join(Scan { spacing, ..smooth }, scan, voxel);
+    let (sheet, room) =
+        (smooth.points.len(), config.max_points.saturating_sub(smooth.points.len()));
+    let scan = loose::join(Scan { spacing, ..smooth }, scan, voxel, room, belongs);
     let report = CleanReport {
         points: total,
         kept: scan.points.len(),
         merged,
         outliers,
         loose,
+        single: scan.points.len() - sheet,
         voxel,
         radius,
         noise,
@@ -135,8 +143,18 @@ fn positions(samples: &[Sample]) -> Vec<Point3<f64>> {
     samples.iter().map(|s| s.point).collect()
 }
 
-/// All points within [`MAX_DISTANCE`] of their median, axis by axis.
-fn gather(scan: &PlacedScan) -> Vec<Sample> {
+/// The median of all points, axis by axis.
+fn middle(scan: &PlacedScan) -> Point3<f64> {
+    let points = || scan.views.iter().flat_map(|view| &view.points);
+    let median = [0, 1, 2].map(|axis| {
+        let mut values: Vec<f64> = points().map(|p| p[axis]).collect();
+        median(&mut values).unwrap_or(0.0)
+    });
+    Point3::from(median)
+}
+
+/// All points that belong to the surface.
+fn gather(scan: &PlacedScan, belongs: impl Fn(&Point3<f64>) -> bool) -> Vec<Sample> {
     let mut samples = Vec::with_capacity(scan.len());
     for (view, content) in scan.views.iter().enumerate() {
         for (i, &point) in content.points.iter().enumerate() {
@@ -144,12 +162,7 @@ fn gather(scan: &PlacedScan) -> Vec<Sample> {
             samples.push(Sample { point, hint, view });
         }
     }
-    let median = [0, 1, 2].map(|axis| {
-        let mut values: Vec<f64> = samples.iter().map(|s| s.point[axis]).collect();
-        median(&mut values).unwrap_or(0.0)
-    });
-    let median = Point3::from(median);
-    samples.retain(|s| (s.point - median).norm() <= MAX_DISTANCE);
+    samples.retain(|s| belongs(&s.point));
     samples
 }
 

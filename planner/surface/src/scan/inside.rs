@@ -2,17 +2,25 @@
 
 use nalgebra::Point3;
 
+use super::warning::ScanWarning;
 use super::winding::Wound;
 
-/// How far apart they are, but for solids of more than some cubic metres. \[m\]
+/// How far apart they are, but for solids of more than four cubic metres. \[m\]
 const APART: f64 = 0.02;
 /// How far its lines are off the middles of its cells along x and y, by its step.
 const ASIDE: [f64; 2] = [1.7e-4, 1e-4];
 /// Most places in one file.
 const MOST: f64 = 500_000.0;
 
+/// Most lines on which they are found: a large sheet encloses little.
+const LINES: f64 = 4_000_000.0;
+
 /// Places inside the closed pieces of a mesh, on a grid; none in a hollow, whose wall looks into it.
-pub(super) fn fill(vertices: &[Point3<f64>], wound: &Wound) -> Vec<Point3<f64>> {
+pub(super) fn fill(
+    vertices: &[Point3<f64>],
+    wound: &Wound,
+    warnings: &mut Vec<ScanWarning>,
+) -> Vec<Point3<f64>> {
     let faces: Vec<[Point3<f64>; 3]> = wound
         .triangles
         .iter()
@@ -30,9 +38,14 @@ pub(super) fn fill(vertices: &[Point3<f64>], wound: &Wound) -> Vec<Point3<f64>> 
         (low, high) = (low.inf(p), high.sup(p));
     }
     let size = high - low;
-    let apart = APART.max((size.x * size.y * size.z / MOST).cbrt());
-    if !apart.is_finite() {
+    let [volume, shade] = volume_and_shade(&faces, first[0]);
+    let apart = APART.max((volume / MOST).cbrt()).max((shade / LINES).sqrt());
+    // A line's number would leave its range.
+    if !apart.is_finite() || size.amax() / apart > f64::from(u32::MAX) {
         return Vec::new();
+    }
+    if apart > APART {
+        warnings.push(ScanWarning::FilledWide { apart });
     }
     // Upright lines through the middles of a grid's cells, a little aside, along x more than along y:
     // no mesh that people draw has its edges or its diagonals there.
@@ -79,11 +92,20 @@ pub(super) fn fill(vertices: &[Point3<f64>], wound: &Wound) -> Vec<Point3<f64>> 
     places
 }
 
+/// What the faces enclose \[m³\], and what they cover as seen from above \[m²\].
+fn volume_and_shade(faces: &[[Point3<f64>; 3]], origin: Point3<f64>) -> [f64; 2] {
+    faces.iter().fold([0.0; 2], |[volume, shade], [a, b, c]| {
+        let twice = (b - a).cross(&(c - a));
+        [volume + (a - origin).dot(&twice) / 6.0, shade + 0.25 * twice.z.abs()]
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use super::super::{Format, RawScan, ReadOptions, read_bytes};
+    use super::super::{Format, RawScan, ReadOptions, ScanWarning, read_bytes};
+    use super::{APART, MOST};
 
     /// A box in the words of an OBJ file, its faces looking inwards if `hollow`; without its lid if
     /// `open`.
@@ -121,5 +143,58 @@ mod tests {
         assert!(walls.iter().all(|p| p.coords.amax() > 0.1));
 
         assert!(read(&brick(-0.2, 0.2, 0, false, true)).inside.is_empty());
+    }
+
+    #[test]
+    fn small_things_far_apart_are_filled_as_closely_as_one_alone() {
+        // Sides that are exact wherever the thing stands.
+        let alone = brick(-0.0625, 0.0625, 0, false, false);
+        let away: String = brick(-0.0625, 0.0625, 8, false, false)
+            .lines()
+            .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+                ["v", x, y, z] => {
+                    let [x, y, z] = [x, y, z].map(|c| c.parse::<f64>().expect("a number"));
+                    format!("v {} {} {}\n", x + 6.0, y + 5.0, z + 2.0)
+                }
+                _ => format!("{line}\n"),
+            })
+            .collect();
+        let both = read(&(alone + &away));
+        assert_eq!(both.inside.len(), 2 * 6 * 6 * 6);
+        assert_eq!(both.warnings, []);
+    }
+
+    #[test]
+    fn where_much_is_enclosed_it_is_told_how_wide_apart_the_places_lie() {
+        let hall = read(&brick(-2.0, 2.0, 0, false, false));
+        let apart = (64.0 / MOST).cbrt();
+        assert!(apart > APART);
+        let told: Vec<_> =
+            hall.warnings.iter().filter(|w| matches!(w, ScanWarning::FilledWide { .. })).collect();
+        let [ScanWarning::FilledWide { apart: found }] = told[..] else { panic!("{told:?}") };
+        assert!((found - apart).abs() < 1e-9);
+        let count = hall.inside.len() as f64;
+        assert!((0.95 * MOST..1.05 * MOST).contains(&count), "{count}");
+    }
+
+    /// A room in which a thing stands, drawn as it is seen from within.
+    #[test]
+    fn what_looks_inwards_is_a_room_and_not_full() {
+        let room = read(&brick(-1.0, 1.0, 0, true, false));
+        assert!(room.inside.is_empty());
+        let faces = 12;
+        assert!(room.warnings.contains(&ScanWarning::LooksInwards { faces, of: 12 }));
+        let furnished = brick(-1.0, 1.0, 0, true, false) + &brick(-0.1, 0.1, 8, false, false);
+        let furnished = read(&furnished);
+        assert_eq!(furnished.inside.len(), 10 * 10 * 10);
+        assert!(furnished.inside.iter().all(|p| p.coords.amax() < 0.1));
+        assert!(furnished.warnings.contains(&ScanWarning::LooksInwards { faces, of: 24 }));
+        // Faces wound this way and that say nothing.
+        let mut mixed: Vec<String> =
+            brick(-0.2, 0.2, 0, false, false).lines().map(Into::into).collect();
+        let inwards = brick(-0.2, 0.2, 0, true, false);
+        mixed[8] = inwards.lines().nth(8).unwrap().into();
+        let mixed = read(&(mixed.join("\n") + "\n"));
+        assert_eq!(mixed.inside.len(), 20 * 20 * 20);
     }
 }

@@ -35,7 +35,7 @@ fn read(bytes: &[u8]) -> Result<Parsed, Malformed> {
         );
     }
     let at_a_time = (BLOCK / record.max(1)).max(1);
-    let mut parsed = Parsed::default();
+    let mut parsed = Parsed { sensor: None, ..Parsed::default() };
     loop {
         let block = file.read_points(at_a_time).map_err(wrong)?;
         if block.is_empty() {
@@ -67,8 +67,17 @@ fn check_chunks(bytes: &[u8]) -> Result<(), Malformed> {
     if !is_laz {
         return Ok(());
     }
-    let points = number(96, 4).and_then(|at| usize::try_from(at).ok());
-    let table = points.and_then(|at| number(at, 8)).and_then(|at| usize::try_from(at).ok());
+    let points = number(96, 4);
+    let offset = |at: u64| number(usize::try_from(at).ok()?, 8);
+    // Who could not go back to say where the table is says −1 there, and says it at the end.
+    let behind = |table: &u64| {
+        points.zip(i64::try_from(*table).ok()).is_some_and(|(points, table)| table > points as i64)
+    };
+    let table = points.and_then(offset).filter(behind).or_else(|| {
+        let last = (bytes.len() as u64).checked_sub(8)?;
+        offset(last)
+    });
+    let table = table.and_then(|at| usize::try_from(at).ok());
     let chunks = table.and_then(|at| number(at.checked_add(4)?, 4));
     match chunks {
         Some(chunks) if chunks <= bytes.len() as u64 => Ok(()),
@@ -127,6 +136,19 @@ mod tests {
         many[107..111].copy_from_slice(&u32::MAX.to_le_bytes());
         let error = parse(&many).unwrap_err();
         assert!(error.cause.starts_with("4294967295 points of 20 bytes"), "{error:?}");
+    }
+
+    /// As laszip writes to a pipe.
+    #[test]
+    fn a_stream_says_at_its_end_where_its_chunks_are() {
+        let whole = file(true, 0.0);
+        let at = u32::from_le_bytes(whole[96..100].try_into().unwrap()) as usize;
+        let mut streamed = whole.clone();
+        let table = whole[at..at + 8].to_vec();
+        streamed[at..at + 8].copy_from_slice(&(-1i64).to_le_bytes());
+        assert!(parse(&streamed).is_err());
+        streamed.extend(table);
+        assert_eq!(parse(&streamed).unwrap().points, parse(&whole).unwrap().points);
     }
 
     #[test]

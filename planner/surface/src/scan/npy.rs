@@ -39,6 +39,8 @@ struct Array {
     count: usize,
     /// Values beside x, y, z.
     others: bool,
+    /// Points are records, whose fields' sizes add up to the stride.
+    records: bool,
 }
 
 /// A number in a record.
@@ -59,8 +61,15 @@ impl Kind {
     fn of(text: &str) -> Option<Self> {
         let big = text.starts_with('>');
         let text = text.trim_start_matches(['<', '>', '|', '=']);
-        let size = text.get(1..)?.parse().ok().filter(|size| (1..=1024).contains(size))?;
-        Some(Self { letter: text.bytes().next()?, size, big })
+        let letter = text.bytes().next()?;
+        let size: usize = text.get(1..)?.parse().ok().filter(|size| (1..=1024).contains(size))?;
+        // Text is counted in characters, of which each takes four bytes.
+        let size = match letter {
+            b'U' => 4 * size,
+            b'f' | b'i' | b'u' | b'b' | b'c' | b'S' | b'V' => size,
+            _ => return None,
+        };
+        Some(Self { letter, size, big })
     }
 
     fn is_number(self) -> bool {
@@ -121,6 +130,7 @@ impl Array {
             columns: [column(0), column(1), column(2)],
             count: count(dimensions).ok_or_else(large)?,
             others: *values > 3,
+            records: false,
         })
     }
 
@@ -132,7 +142,7 @@ impl Array {
             let (name, kind) = (words.next().unwrap_or(""), words.next().and_then(Kind::of));
             let plain = field.matches(['\'', '"']).count() == 4;
             let Some(kind) = kind.filter(|_| plain) else {
-                return Err(format!("field {name:?} is no single value"));
+                return Err(format!("field {name:?} is no single value of a kind that is read"));
             };
             for (column, wanted) in columns.iter_mut().zip(["x", "y", "z"]) {
                 if name == wanted && kind.is_number() {
@@ -145,7 +155,7 @@ impl Array {
         let [Some(x), Some(y), Some(z)] = columns else {
             return Err("its records have no fields x, y, z".into());
         };
-        Ok(Self { stride, columns: [x, y, z], count, others: fields > 3 })
+        Ok(Self { stride, columns: [x, y, z], count, others: fields > 3, records: true })
     }
 
     fn points(&self, data: &[u8], begin: usize) -> Result<Parsed, Malformed> {
@@ -163,6 +173,13 @@ impl Array {
         };
         parsed.points = data[..needed].chunks_exact(self.stride).map(point).collect();
         if needed < data.len() {
+            if self.records {
+                let (more, stride, count) = (data.len() - needed, self.stride, self.count);
+                return malformed(
+                    Place::Byte(begin + needed),
+                    format!("{more} bytes more than {count} records of {stride} bytes each"),
+                );
+            }
             let place = Place::Byte(begin + needed);
             parsed.warnings.push(ScanWarning::TrailingData { place });
         }
@@ -223,6 +240,19 @@ mod tests {
     }
 
     #[test]
+    fn a_text_in_a_record_takes_four_bytes_a_character() {
+        let header = "{'descr': [('label', '<U8'), ('x', '<f4'), ('y', '<f4'), ('z', '<f4')], \
+                      'fortran_order': False, 'shape': (2,), }";
+        let mut data = Vec::new();
+        for k in [0.0f32, 1.0] {
+            data.extend("a seat  ".chars().flat_map(|c| u32::from(c).to_le_bytes()));
+            data.extend([1.0 + k, 2.0, 3.0].map(f32::to_le_bytes).concat());
+        }
+        let points = [Point3::new(1.0, 2.0, 3.0), Point3::new(2.0, 2.0, 3.0)];
+        assert_eq!(parse(&file(header, &data)).unwrap().points, points);
+    }
+
+    #[test]
     fn what_is_no_array_of_points_is_refused_with_the_cause() {
         let of = |header: &str| parse(&file(header, &[0; 24])).unwrap_err().cause;
         let shape = |shape: &str| {
@@ -238,6 +268,9 @@ mod tests {
         );
         assert!(of("{'descr': [('a', '<f4')], 'shape': (2,), }").contains("x, y, z"));
         assert!(of("{'descr': [('x', '<f4', (3,))], 'shape': (2,), }").contains("single value"));
+        assert!(of("{'descr': [('o', '|O8'), ('x', '<f4')], 'shape': (2,), }").contains("\"o\""));
+        let records = "{'descr': [('x', '<f4'), ('y', '<f4'), ('z', '<f4')], 'shape': (1,), }";
+        assert_eq!(of(records), "12 bytes more than 1 records of 12 bytes each");
         for cut in [0, 6, 9, 12] {
             let whole = file("{'descr': '<f4', 'shape': (2, 3), }", &[0; 24]);
             assert!(parse(&whole[..cut]).is_err(), "{cut}");

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::warning::ScanWarning;
 
 /// What a parser hands over: everything in the file's unit, nothing filtered.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Parsed {
     /// Points, or the vertices of a mesh.
     pub(super) points: Vec<Point3<f64>>,
@@ -13,6 +13,22 @@ pub(super) struct Parsed {
     pub(super) normals: Vec<Vector3<f64>>,
     /// Corners as indices into `points`; not empty: a mesh.
     pub(super) triangles: Vec<[usize; 3]>,
+    /// The sensor's pose by a PCD header, which is not applied.
     pub(super) viewpoint: Option<Isometry3<f64>>,
+    /// Where the sensor stood among the points; by default their origin.
+    pub(super) sensor: Option<Point3<f64>>,
     pub(super) warnings: Vec<ScanWarning>,
+}
+
+impl Default for Parsed {
+    fn default() -> Self {
+        Self {
+            points: Vec::new(),
+            normals: Vec::new(),
+            triangles: Vec::new(),
+            viewpoint: None,
+            sensor: Some(Point3::origin()),
+            warnings: Vec::new(),
+        }
+    }
 }

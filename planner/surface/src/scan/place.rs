@@ -10,11 +10,13 @@ use super::stray;
 /// What is known about where a scan was taken.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Placement {
-    /// The sensor's pose in the floor frame: takes the file's coordinates to the floor frame.
+    /// The pose that takes the file's coordinates to the floor frame: the sensor's own, where that
+    /// is the origin of the file's frame ([`RawScan::sensor`]).
     SensorPose(Isometry3<f64>),
     /// The direction against gravity in the file's frame, the sensor's height above the plane
-    /// that the object stands on, and that plane's height above the floor (a table). The sensor
-    /// is the origin of the file's frame; the points' mean comes to stand over the origin.
+    /// that the object stands on, and that plane's height above the floor (a table). Where
+    /// the sensor is not known ([`RawScan::sensor`]), the height is that of the origin of the file's
+    /// frame. The points' mean comes to stand over the origin.
     UpAndHeight {
         /// Against gravity, in the file's frame.
         up: UnitVector3<f64>,
@@ -75,7 +77,8 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
         Placement::UpAndHeight { up, sensor_height, support_height } => {
             let upright = upright(up);
             let mean = mean(&raw.points, &upright);
-            let height = sensor_height + support_height;
+            let sensor = upright * raw.sensor.unwrap_or_default();
+            let height = sensor_height + support_height - sensor.z;
             Isometry3::from_parts(Translation3::new(-mean.x, -mean.y, height), upright)
         }
         Placement::Up { up, support_height } => {
@@ -89,7 +92,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
     let sensor = match placement {
         Placement::Up { .. } => None,
         Placement::Frame { sensor, .. } => *sensor,
-        _ => Some(Point3::from(pose.translation.vector)),
+        _ => raw.sensor.map(|at| pose * at),
     };
     let view = View {
         points: raw.points.iter().map(|p| pose * p).collect(),

@@ -1,6 +1,6 @@
 //! PTX: what a terrestrial scanner saw in rows and columns, with its place; one scan after another.
 
-use nalgebra::{Isometry3, Matrix4, Point3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Matrix3, Matrix4, Point3, RowVector4};
 
 use super::decode::{decode, number};
 use super::error::{Malformed, Place, malformed};
@@ -19,6 +19,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let (mut scans, mut nothing) = (0, 0);
     while lines.peek().is_some() {
         let mut head = Vec::with_capacity(HEAD.len());
+        let mut last = 0;
         for wanted in HEAD {
             let Some((index, line)) = lines.next() else {
                 return malformed(
@@ -32,8 +33,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
                 return malformed(Place::Line(index + 1), cause);
             };
             head.push(values);
+            last = index + 1;
         }
         let pose = Matrix4::from_fn(|row, column| head[6 + column][row]);
+        if !is_rigid(&pose) {
+            return malformed(
+                Place::Line(last),
+                "the matrix that ends here is no rotation with a translation: its lines are the scanner's \
+                 axes and its place, with 0, 0, 0 and 1 behind them",
+            );
+        }
         let count = head[0][0] * head[1][0];
         if !(count >= 0.0 && count.fract() == 0.0 && count < 1e12) {
             return malformed(Place::Line(1), format!("{count} points are announced"));
@@ -54,7 +63,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
             }
         }
         scans += 1;
-        parsed.viewpoint = (scans == 1).then(|| rigid(&pose)).flatten();
+        let at = pose.transform_point(&Point3::origin());
+        parsed.sensor = (scans == 1).then_some(at);
     }
     if nothing > 0 {
         parsed.warnings.push(ScanWarning::AtOrigin { dropped: nothing });
@@ -69,20 +79,17 @@ fn numbers(line: &str) -> Option<Vec<f64>> {
     line.split_whitespace().map(number).collect()
 }
 
-/// The scanner's pose, where the matrix is one.
-fn rigid(matrix: &Matrix4<f64>) -> Option<Isometry3<f64>> {
+/// Farthest that a matrix may be from a rotation: files hold few digits.
+const ROUNDED: f64 = 1e-3;
+
+/// Whether a matrix turns and moves, and does nothing else.
+fn is_rigid(matrix: &Matrix4<f64>) -> bool {
     let turn = matrix.fixed_view::<3, 3>(0, 0).into_owned();
-    let place = matrix.fixed_view::<3, 1>(0, 3).into_owned();
-    let is_turn = (turn * turn.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-3
+    let last = matrix.row(3) - RowVector4::new(0.0, 0.0, 0.0, 1.0);
+    matrix.iter().all(|x| x.is_finite())
+        && (turn * turn.transpose() - Matrix3::identity()).norm() < ROUNDED
         && turn.determinant() > 0.0
-        && place.iter().all(|x| x.is_finite());
-    let turn = Rotation3::from_matrix_unchecked(turn);
-    is_turn.then(|| {
-        Isometry3::from_parts(
-            Translation3::from(place),
-            UnitQuaternion::from_rotation_matrix(&turn),
-        )
-    })
+        && last.norm() < 1e-9
 }
 
 #[cfg(test)]
@@ -97,11 +104,10 @@ mod tests {
         let parsed = parse(once.as_bytes()).unwrap();
         // x of the scanner is y of the file.
         assert_eq!(parsed.points, [Point3::new(5.0, 7.0, 7.0)]);
-        let pose = parsed.viewpoint.unwrap();
-        assert!((pose * Point3::new(1.0, 0.0, 0.0) - Point3::new(5.0, 7.0, 7.0)).norm() < 1e-9);
+        assert_eq!((parsed.sensor, parsed.viewpoint), (Some(Point3::new(5.0, 6.0, 7.0)), None));
         assert!(parsed.warnings.contains(&ScanWarning::AtOrigin { dropped: 1 }));
         let twice = parse((once.clone() + &once).as_bytes()).unwrap();
-        assert_eq!((twice.points.len(), twice.viewpoint), (2, None));
+        assert_eq!((twice.points.len(), twice.sensor), (2, None));
     }
 
     #[test]
@@ -113,5 +119,23 @@ mod tests {
         assert!(of(HEAD.replacen('2', "1e11", 1)).cause.contains("0 of 100000000000"));
         assert!(of(HEAD.replacen('2', "-2", 1)).cause.contains("-2 points"));
         assert!(of("2\n1\n".into()).cause.contains("head"));
+    }
+
+    /// A translation in the last column divides by what is no 1; a scale or a mirror moves nothing
+    /// to where it was.
+    #[test]
+    fn a_matrix_that_is_no_pose_is_refused() {
+        let above: String = HEAD.lines().take(6).map(|line| format!("{line}\n")).collect();
+        for matrix in [
+            "0 -1 0 5\n1 0 0 6\n0 0 1 7\n0 0 0 1\n",
+            "2 0 0 0\n0 2 0 0\n0 0 2 0\n5 6 7 1\n",
+            "1 0 0 0\n0 1 0 0\n0 0 -1 0\n5 6 7 1\n",
+            "0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n",
+        ] {
+            let error = parse(format!("{above}{matrix}1 2 3 0.5\n1 2 3 0.5\n").as_bytes());
+            let error = error.expect_err(matrix);
+            assert_eq!(error.place, Place::Line(10), "{error:?}");
+            assert!(error.cause.contains("no rotation"), "{error:?}");
+        }
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, UnitVector3};
 use super::warning::ScanWarning;
 
 /// Points as the file holds them: finite, scaled to metres, in the file's own frame.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RawScan {
     /// The finite points. \[m\]
     pub points: Vec<Point3<f64>>,
@@ -18,8 +18,28 @@ pub struct RawScan {
     /// are already in the optical frame, so it is applied only on request
     /// (`Placement::Viewpoint`).
     pub viewpoint: Option<Isometry3<f64>>,
+    /// Where the sensor stood, in the frame of the points: for a depth camera the origin; for a
+    /// scanner whose file moves its points to their place, where that file says; `None` for what no
+    /// single place has seen or nobody says from where: several scans in one file, a flown lidar's
+    /// points, a mesh. \[m\]
+    pub sensor: Option<Point3<f64>>,
     /// Points dropped as NaN or infinite.
     pub dropped: usize,
     /// What the user should know.
     pub warnings: Vec<ScanWarning>,
+}
+
+impl Default for RawScan {
+    /// No points, of a depth camera.
+    fn default() -> Self {
+        Self {
+            points: Vec::new(),
+            normals: None,
+            inside: Vec::new(),
+            viewpoint: None,
+            sensor: Some(Point3::origin()),
+            dropped: 0,
+            warnings: Vec::new(),
+        }
+    }
 }

@@ -147,7 +147,8 @@ pub fn read_bytes(
 }
 
 fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan, ScanError> {
-    let Parsed { mut points, mut normals, triangles, mut viewpoint, mut warnings } = parsed;
+    let Parsed { mut points, mut normals, triangles, mut viewpoint, mut sensor, mut warnings } =
+        parsed;
     let scale = scale(options.scale, &mut warnings);
     for p in &mut points {
         p.coords *= scale;
@@ -155,10 +156,15 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     if let Some(pose) = &mut viewpoint {
         pose.translation.vector *= scale;
     }
+    if let Some(at) = &mut sensor {
+        at.coords *= scale;
+    }
     let (mut dropped, mut inside) = (0, Vec::new());
     if !triangles.is_empty() {
+        sensor = None;
+        unused(points.len(), &triangles, &mut warnings);
         let wound = winding::outward(&points, triangles, &mut warnings);
-        inside = inside::fill(&points, &wound);
+        inside = inside::fill(&points, &wound, &mut warnings);
         (points, normals, dropped) =
             sample::sample(&points, &wound, options.mesh_spacing, options.seed, &mut warnings);
     }
@@ -203,7 +209,17 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     let normals = (normals.len() == points.len())
         .then(|| normals.into_iter().map(unit).collect::<Option<Vec<_>>>())
         .flatten();
-    Ok(RawScan { points, normals, inside, viewpoint, dropped, warnings })
+    Ok(RawScan { points, normals, inside, viewpoint, sensor, dropped, warnings })
+}
+
+/// Tells of a mesh's vertices that are in none of its faces, as points and lines beside them are.
+fn unused(vertices: usize, triangles: &[[usize; 3]], warnings: &mut Vec<ScanWarning>) {
+    let mut used = vec![false; vertices];
+    triangles.iter().flatten().for_each(|&corner| used[corner] = true);
+    let points = used.iter().filter(|used| !**used).count();
+    if points > 0 {
+        warnings.push(ScanWarning::NoFace { points });
+    }
 }
 
 /// The factor to metres: the user's, else 1, as what the columns say is in the points by now.

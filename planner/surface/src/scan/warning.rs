@@ -122,6 +122,23 @@ pub enum ScanWarning {
         /// Of how many.
         of: usize,
     },
+    /// Points of a mesh's file that are in none of its faces were left out.
+    NoFace {
+        /// How many.
+        points: usize,
+    },
+    /// What closed meshes enclose is so much that the places that stand for it lie wider apart.
+    FilledWide {
+        /// How far. \[m\]
+        apart: f64,
+    },
+    /// Closed pieces that look inwards, as a room's walls do: what they enclose is not solid.
+    LooksInwards {
+        /// How many faces they have.
+        faces: usize,
+        /// Of how many.
+        of: usize,
+    },
     /// The format says which way is up in its files.
     Upright {
         /// The format.
@@ -238,6 +255,20 @@ impl fmt::Display for ScanWarning {
             Self::FacesTurned { faces, of } => {
                 write!(f, "{faces} of {of} faces looked inwards and were turned round")
             }
+            Self::NoFace { points } => {
+                write!(f, "{points} points beside the mesh left out: no face uses them")
+            }
+            Self::FilledWide { apart } => write!(
+                f,
+                "closed meshes enclose much: a place every {:.0} mm stands for their inside, which is \
+                 none in what is thinner",
+                apart * 1e3
+            ),
+            Self::LooksInwards { faces, of } => write!(
+                f,
+                "{faces} of {of} faces are of closed pieces that look inwards, as a room's walls do: \
+                 what these enclose is taken for free"
+            ),
             Self::Upright { format, up: [x, y, z] } => {
                 write!(f, "{format} files are in metres and have {x},{y},{z} up")
             }

@@ -12,14 +12,15 @@ use super::warning::ScanWarning;
 pub(super) struct Wound {
     pub(super) triangles: Vec<[usize; 3]>,
     pub(super) turned: Vec<bool>,
-    /// Which faces are of pieces that enclose something and know their outside.
+    /// Which faces are of pieces that enclose something solid and know their outside.
     pub(super) closed: Vec<bool>,
 }
 
 /// Leaves out faces that cover others, and finds the outside of each connected piece: a closed one
 /// encloses a volume; of an open one, that side which is seen from around and above, if it is seen
 /// by far most. Else, and inside other pieces, faces stay as most of the piece is wound; that is
-/// told where the shape does not bear it out.
+/// told where the shape does not bear it out. A closed piece all of which looks inwards, in no
+/// other, is a room's wall as well as a thing inside out: it encloses nothing solid.
 pub(super) fn outward(
     vertices: &[Point3<f64>],
     triangles: Vec<[usize; 3]>,
@@ -27,7 +28,8 @@ pub(super) fn outward(
 ) -> Wound {
     let of = triangles.len();
     let triangles = once(vertices, triangles);
-    if triangles.len() < of {
+    let is_twofold = triangles.len() < of;
+    if is_twofold {
         warnings.push(ScanWarning::TwiceCovered { faces: of - triangles.len(), of });
     }
     let of = triangles.len();
@@ -46,7 +48,7 @@ pub(super) fn outward(
     let solids: Vec<Solid> =
         pieces.iter().filter(|p| p.closed).map(|p| Solid::new(faces(p, false))).collect();
     let (mut turned, mut closed) = (vec![false; of], vec![false; of]);
-    let mut unknown = 0;
+    let (mut unknown, mut inwards) = (0, 0);
     for piece in &pieces {
         // Most of the piece's area as the file has it.
         let as_given: f64 = piece
@@ -73,14 +75,22 @@ pub(super) fn outward(
             unknown += piece.faces.len();
         }
         let turn = if verdict == Some(false) { !given } else { given };
+        // Of faces that are there both ways, the first one says nothing.
+        let is_room = piece.closed && verdict == Some(false) && !piece.mixed() && !is_twofold;
+        if is_room {
+            inwards += piece.faces.len();
+        }
         for &(face, against) in &piece.faces {
             turned[face] = piece.oriented && (against != turn);
-            closed[face] = piece.closed && verdict.is_some();
+            closed[face] = piece.closed && verdict.is_some() && !is_room;
         }
     }
     let faces = turned.iter().filter(|&&t| t).count();
     if faces > 0 {
         warnings.push(ScanWarning::FacesTurned { faces, of });
+    }
+    if inwards > 0 {
+        warnings.push(ScanWarning::LooksInwards { faces: inwards, of });
     }
     if unknown > 0 {
         warnings.push(ScanWarning::SideUnknown { faces: unknown, of });
@@ -263,8 +273,9 @@ mod tests {
 
         let inward: Vec<_> = faces.iter().map(|&f| turn(f)).collect();
         let (wound, warnings) = told(&corners, &inward);
-        assert!(wound.turned.iter().all(|t| *t));
-        assert_eq!(warnings, [ScanWarning::FacesTurned { faces: 12, of: 12 }]);
+        assert!(wound.turned.iter().all(|t| *t) && !wound.closed.contains(&true));
+        let room = ScanWarning::LooksInwards { faces: 12, of: 12 };
+        assert_eq!(warnings, [ScanWarning::FacesTurned { faces: 12, of: 12 }, room]);
 
         let mixed: Vec<_> =
             faces.iter().enumerate().map(|(i, &f)| if i % 3 == 0 { turn(f) } else { f }).collect();
@@ -275,7 +286,7 @@ mod tests {
         let both: Vec<_> = faces.iter().flat_map(|&f| [turn(f), f]).collect();
         let (wound, warnings) = told(&corners, &both);
         assert_eq!(wound.triangles.len(), 12);
-        assert!(wound.turned.iter().all(|t| *t));
+        assert!(wound.turned.iter().all(|t| *t) && !wound.closed.contains(&false));
         assert_eq!(warnings[0], ScanWarning::TwiceCovered { faces: 12, of: 24 });
     }
 
@@ -290,7 +301,8 @@ mod tests {
         corners.extend(hollow);
         let (wound, warnings) = told(&corners, &faces);
         assert!((0..36).all(|i| wound.turned[i] == (12..24).contains(&i)));
-        assert_eq!(warnings, [ScanWarning::FacesTurned { faces: 12, of: 36 }]);
+        let room = ScanWarning::LooksInwards { faces: 12, of: 36 };
+        assert_eq!(warnings, [ScanWarning::FacesTurned { faces: 12, of: 36 }, room]);
     }
 
     #[test]
