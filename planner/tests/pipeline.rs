@@ -28,6 +28,11 @@ fn plan_on(threads: usize, seat: &Scene, job: &Job) -> Outcome {
 }
 
 fn check(outcome: &Outcome) {
+    let f = &outcome.figures;
+    let added = &outcome.patches[f.patches..];
+    let strokes = added.iter().filter(|patch| patch.points.is_empty()).count();
+    println!("{} patches, {strokes} of them strokes, were added", added.len());
+    assert_eq!((f.fill_in_patches, f.strokes), (added.len() - strokes, strokes));
     let v = &outcome.figures.verification;
     assert!(v.violations.is_empty(), "{:?}", v.violations);
     assert!(v.coverage_reachable > 0.95, "reachable points: {}", v.coverage_reachable);

@@ -101,11 +101,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         exit::BROKEN_PIPE,
         Arc::new(AtomicBool::new(true)),
     );
-    let cli: Cli = match nullsweep_cell::parse(
-        args,
-        &[("replan", &PLACED), ("init", &nullsweep_cell::FLAGS)],
-        &[],
-    ) {
+    let cli: Cli = match nullsweep_cell::parse(args, &[("replan", &PLACED)], &[]) {
         Ok(cli) => cli,
         Err(e) => {
             let _ = e.print();

@@ -1,10 +1,10 @@
 //! Scan files in the floor frame, joined.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::Args;
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use nullsweep_planner::progress::Progress;
 use nullsweep_surface::room;
 use nullsweep_surface::scan::ScanWarning;
@@ -12,8 +12,7 @@ use nullsweep_surface::{PlacedScan, Placement, RawScan, ReadOptions, scan};
 
 use crate::advice;
 use crate::bars::Bars;
-use crate::exit::Usage;
-use crate::floor::{Placed, Source};
+use crate::floor::Placed;
 use crate::numbers::{Numbers, finite, isometry, not_negative, positive};
 use crate::scene_file::SceneFile;
 use crate::views;
@@ -21,7 +20,8 @@ use crate::views;
 /// How the scans stand.
 #[derive(Clone, Debug, Args)]
 pub(super) struct PlacedArgs {
-    /// Pose of a scan's sensor in the floor frame: x,y,z,qx,qy,qz,qw; once for each scan.
+    /// Pose of a scan's sensor in the floor frame: x,y,z,qx,qy,qz,qw; once for each scan. Of a file
+    /// whose sensor is not its origin (a mesh, PTX or E57), the pose of its frame.
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     sensor_pose: Vec<Numbers<7>>,
     /// Direction against gravity in the scans' frame: x,y,z.
@@ -62,23 +62,20 @@ pub(super) fn read_scans(
     if let [path] = scans
         && path.extension().is_some_and(|extension| extension == "toml")
     {
-        // Some of it may be a cell's, for scans that have no scene file.
-        if args.up.is_some() || !args.sensor_pose.is_empty() || args.scale != 1.0 {
-            bars.note(&format!(
-                "{} says how its scans stand: --up, --sensor-pose and --scale are not heeded",
-                path.display()
-            ));
-        }
+        let given = args.up.is_some() || !args.sensor_pose.is_empty() || args.scale != 1.0;
+        ensure!(
+            !given,
+            "{}: a scene file says how its scans stand: leave out --up, --sensor-pose and --scale",
+            path.display()
+        );
         return SceneFile::read(path);
     }
-    if !args.sensor_pose.is_empty() && args.sensor_pose.len() != scans.len() {
-        return Err(Usage(format!(
-            "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
-            scans.len(),
-            args.sensor_pose.len()
-        ))
-        .into());
-    }
+    ensure!(
+        args.sensor_pose.is_empty() || args.sensor_pose.len() == scans.len(),
+        "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
+        scans.len(),
+        args.sensor_pose.len()
+    );
     let options = ReadOptions { scale: args.scale, seed, ..ReadOptions::default() };
     let mut files = Vec::with_capacity(scans.len());
     for path in scans {
@@ -94,11 +91,17 @@ pub(super) fn read_scans(
         // All files share the frame of the first one.
         shared = Some(together(args, &files, seed, gravity, bars)?);
     }
-    let (mut joined, mut sources) = (PlacedScan::default(), Vec::with_capacity(files.len()));
+    let (mut joined, mut poses) = (PlacedScan::default(), Vec::with_capacity(files.len()));
     for (i, (path, raw)) in files.into_iter().enumerate() {
-        let placement = match &shared {
-            Some(shared) => shared.clone(),
+        let placement = match shared {
+            Some((pose, is_seen)) => {
+                let sensor = raw.sensor.filter(|_| is_seen).map(|at| pose * at);
+                Placement::Frame { pose, sensor }
+            }
             None => {
+                if raw.sensor.is_none() {
+                    note_unseen(path, "the pose is", bars);
+                }
                 Placement::SensorPose(isometry(&args.sensor_pose[i].0).context("--sensor-pose")?)
             }
         };
@@ -116,21 +119,30 @@ pub(super) fn read_scans(
             }
         }
         joined.join(placed);
-        sources.push(Source { file: path.clone(), scale: args.scale, pose });
+        poses.push(pose);
     }
-    Ok(Placed { scan: joined, sources, seed: None })
+    Ok(Placed { scan: joined, poses, seed: None })
 }
 
-/// The one placement of files that share a frame.
+/// Tells that a file does not say where its sensor stood, though an argument speaks of it.
+fn note_unseen(path: &Path, what: &str, bars: &Bars) {
+    bars.note(&format!(
+        "{}: where its sensor stood is not known (a mesh, a flown lidar, several scans in one): {what} \
+         that of the file's frame, and nothing behind its points counts as unseen",
+        path.display()
+    ));
+}
+
+/// The one pose of files that share a frame, and whether their sensors are to be believed.
 fn together(
     args: &PlacedArgs,
     files: &[(&PathBuf, RawScan)],
     seed: u64,
     gravity: Gravity,
     bars: &Bars,
-) -> anyhow::Result<Placement> {
-    let Some((path, first)) = files.first() else { return upright(args, None) };
-    let placement = match gravity {
+) -> anyhow::Result<(Isometry3<f64>, bool)> {
+    let Some((path, first)) = files.first() else { return Ok((Isometry3::identity(), false)) };
+    let (placement, is_seen) = match gravity {
         Gravity::Found if args.sensor_height.is_none() => leveled(args, first, seed, bars)?,
         _ => {
             let stated = first.warnings.iter().find_map(|warning| match warning {
@@ -140,7 +152,10 @@ fn together(
             if args.up.is_none() && stated.is_none() {
                 bars.note("up is taken to be 0,0,1 in the file's frame: --up says what it is");
             }
-            upright(args, stated)?
+            if args.sensor_height.is_some() && first.sensor.is_none() {
+                note_unseen(path, "--sensor-height is", bars);
+            }
+            (upright(args, stated)?, args.sensor_height.is_some())
         }
     };
     // What is lowest of all files rests on the support.
@@ -156,8 +171,7 @@ fn together(
         let path = path.display();
         bars.note(&format!("{path}: {below} points alone below all others: nothing rests on them"));
     }
-    let (placed, pose) = scan::place(whole, &placement);
-    Ok(Placement::Frame { pose, sensor: placed.views[0].sensor })
+    Ok((scan::place(whole, &placement).1, is_seen))
 }
 
 /// The direction that `--up` gives.
@@ -168,8 +182,13 @@ fn up(args: &PlacedArgs) -> anyhow::Result<Option<UnitVector3<f64>>> {
     args.up.map(unit).transpose()
 }
 
-/// The placement by the largest level plane of a scan.
-fn leveled(args: &PlacedArgs, raw: &RawScan, seed: u64, bars: &Bars) -> anyhow::Result<Placement> {
+/// The placement by the largest level plane of a scan, and whether its sensor is known.
+fn leveled(
+    args: &PlacedArgs,
+    raw: &RawScan,
+    seed: u64,
+    bars: &Bars,
+) -> anyhow::Result<(Placement, bool)> {
     let level = room::level(raw, up(args)?, seed)?;
     let [x, y, z] = level.up.into_inner().into();
     bars.note(&format!(
@@ -178,14 +197,16 @@ fn leveled(args: &PlacedArgs, raw: &RawScan, seed: u64, bars: &Bars) -> anyhow::
         level.height, level.area
     ));
     let support_height = args.support_height;
-    let placement =
-        Placement::UpAndHeight { up: level.up, sensor_height: level.height, support_height };
-    if level.camera {
-        return Ok(placement);
+    let at = raw.sensor.unwrap_or_default();
+    let sensor_height = level.height + level.up.dot(&at.coords);
+    let placement = Placement::UpAndHeight { up: level.up, sensor_height, support_height };
+    let is_seen = level.camera || raw.sensor.is_some() && at != Point3::origin();
+    if !is_seen {
+        bars.note(
+            "the file's origin is no camera: which side of a surface is outside is voted for",
+        );
     }
-    bars.note("the file's origin is no camera: which side of a surface is outside is voted for");
-    let (_, pose) = scan::place(raw, &placement);
-    Ok(Placement::Frame { pose, sensor: None })
+    Ok((placement, is_seen))
 }
 
 /// Up as it is asked for, else as the file states it, else z.
@@ -197,4 +218,55 @@ fn upright(args: &PlacedArgs, stated: Option<UnitVector3<f64>>) -> anyhow::Resul
         }
         None => Placement::Up { up, support_height: args.support_height },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        placed: PlacedArgs,
+    }
+
+    #[test]
+    fn each_file_has_its_own_sensor_or_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let ptx = |name: &str, at: &str| {
+            let axes = "1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n";
+            let row = |i: usize| format!("0.{:02} 0.{:02} -2 0.5\n", i % 20, i / 20);
+            let rows: String = (0..400).map(row).collect();
+            let path = folder.path().join(name);
+            let text = format!("20\n20\n{at}\n{axes}{at} 1\n{rows}");
+            std::fs::write(&path, text).expect("written");
+            path
+        };
+        let (one, other) = (ptx("one.ptx", "5 6 7"), ptx("other.ptx", "5 6.1 7"));
+        let mesh = folder.path().join("mesh.obj");
+        std::fs::write(&mesh, "v 5 6 5\nv 5.2 6 5\nv 5.2 6.2 5\nf 1 2 3\n").expect("written");
+        let scans = [one, other, mesh];
+        let bars = Bars::new();
+        let sensors = |line: &[&str]| {
+            let args = Line::parse_from(line).placed;
+            let found = read_scans(&args, &scans, 1, Gravity::Given, &bars).expect("scans");
+            let back = |(view, pose): (&scan::View, &Isometry3<f64>)| {
+                view.sensor.map(|at| pose.inverse() * at)
+            };
+            found.scan.views.iter().zip(&found.poses).map(back).collect::<Vec<_>>()
+        };
+        let is_at = |found: Option<Point3<f64>>, y: f64| {
+            found.is_some_and(|at| (at - Point3::new(5.0, y, 7.0)).norm() < 1e-9)
+        };
+        let high = ["x", "--as-placed", "--up=0,0,1", "--sensor-height", "2"];
+        let pose = "--sensor-pose=0,0,0,0,0,0,1";
+        for line in [&high[..], &["x", "--as-placed", pose, pose, pose]] {
+            let found = sensors(line);
+            assert!(is_at(found[0], 6.0) && is_at(found[1], 6.1), "{found:?}");
+            assert_eq!(found[2], None);
+        }
+        assert_eq!(sensors(&["x", "--as-placed", "--up=0,0,1"]), [None; 3]);
+    }
 }

@@ -291,8 +291,12 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
     };
     let found = violations(v.violations.len(), &a.guessed_links);
     let against = format!(
-        "{} points of the surface, {} others, {} raw, {unseen}, {} obstacles",
-        a.surface_points, a.other_points, a.raw_points, a.obstacles
+        "{} points of the surface, {} others, {} raw, {unseen}, {} obstacles{}",
+        a.surface_points,
+        a.other_points,
+        a.raw_points,
+        a.obstacles,
+        a.but_for()
     );
     let distance = (mm(v.scan_distance_p95_m), mm(v.scan_distance_max_m));
     [
@@ -332,7 +336,7 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("points", f.points.to_string());
     row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
-    row("fill-in patches", f.fill_in_patches.to_string());
+    row("fill-in patches, strokes", format!("{}, {}", f.fill_in_patches, f.strokes));
     row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
     row("base x, y, yaw", told(&f.base));
     for (name, position) in &f.held {
@@ -440,5 +444,6 @@ fn job(
 }
 
 fn held(args: &PlanArgs) -> Vec<(String, f64)> {
-    crate::numbers::held(&args.held, args.torso)
+    let torso = args.torso.map(|height| ("torso_lift_joint".to_owned(), height));
+    torso.into_iter().chain(args.held.iter().map(|h| (h.0.clone(), h.1))).collect()
 }

@@ -23,6 +23,8 @@ pub struct Figures {
     pub reachable: usize,
     /// Patches put over what the others' sweep left out.
     pub fill_in_patches: usize,
+    /// Short ways beside a stop between two jumps, so that it sweeps and does not only touch.
+    pub strokes: usize,
     /// Pairs of neighbouring patches.
     pub edge_candidates: usize,
     /// Edges of the graph.

@@ -126,12 +126,15 @@ pub fn run(
         swept: &verification.swept,
     };
     let left_out = clock.time("causes", || left_out(cell, &known));
+    // A stroke leads to a place that has no points of its own.
+    let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {
         points: scan.points.len(),
         patches: found.len(),
         left_out,
         reachable: reachable.iter().filter(|r| **r).count(),
-        fill_in_patches: patches.len() - found.len(),
+        fill_in_patches: patches.len() - found.len() - strokes,
+        strokes,
         base: stance.base,
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),

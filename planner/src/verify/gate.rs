@@ -60,9 +60,19 @@ pub struct Against {
     /// Links whose meshes are missing: capsules stand for them, a guess, so that what was found
     /// says nothing of the real ones.
     pub guessed_links: Vec<String>,
+    /// Links that meet what the robot stands on in every posture, each with what it meets: they are
+    /// not held against it.
+    pub grounded_links: Vec<[String; 2]>,
 }
 
 impl Against {
+    /// What was left out, to be put behind the rest; empty if nothing was.
+    #[must_use]
+    pub fn but_for(&self) -> String {
+        let pair = |[link, other]: &[String; 2]| format!(", but not {link} against the {other}");
+        self.grounded_links.iter().map(pair).collect()
+    }
+
     fn of(scene: &Scene, exact: &Exact) -> Self {
         Self {
             surface_points: scene.surface.points.len(),
@@ -71,6 +81,7 @@ impl Against {
             unseen_points: scene.unseen.len(),
             obstacles: scene.obstacles.len(),
             guessed_links: exact.guessed_links().to_vec(),
+            grounded_links: exact.grounded_links().into_iter().collect(),
         }
     }
 }
@@ -242,4 +253,37 @@ fn distances(plan: &Plan, scan: &Scan, pads: &[Pad]) -> Vec<f64> {
         .collect();
     distances.sort_by(f64::total_cmp);
     distances
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nullsweep_robot::Tool;
+
+    #[test]
+    fn what_the_arm_was_not_held_against_is_named() {
+        let robot = Robot::from_urdf_str(
+            "<robot name='low'><link name='base'/>\
+             <link name='turret'><collision><geometry><cylinder radius='0.1' length='0.1'/></geometry>\
+             </collision></link><link name='boom'/>\
+             <joint name='turn' type='revolute'><parent link='base'/><child link='turret'/>\
+             <axis xyz='0 0 1'/><limit lower='-3' upper='3' velocity='1' effort='1'/></joint>\
+             <joint name='lift' type='revolute'><parent link='turret'/><child link='boom'/>\
+             <origin xyz='0 0 0.4'/><axis xyz='0 -1 0'/>\
+             <limit lower='-0.5' upper='0.5' velocity='1' effort='1'/></joint></robot>",
+        )
+        .unwrap();
+        let arm = robot.arm(&ArmSpec { base: "base".into(), tip: "boom".into() }).unwrap();
+        let (tool, options) = (Tool::default(), Options::default());
+        let of = |scene: &Scene| {
+            let (points, obstacles) = (scene.points(), &scene.obstacles);
+            let exact = Exact::new(&robot, &arm, &tool, points, obstacles, &options).unwrap();
+            Against::of(scene, &exact)
+        };
+        let floor = of(&Scene::empty());
+        assert_eq!(floor.grounded_links, [["turret".to_owned(), "floor".to_owned()]]);
+        assert_eq!(floor.but_for(), ", but not turret against the floor");
+        let nothing = of(&Scene::of_obstacles(Vec::new()));
+        assert_eq!((nothing.grounded_links.len(), nothing.but_for()), (0, String::new()));
+    }
 }

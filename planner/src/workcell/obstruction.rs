@@ -53,6 +53,8 @@ pub enum Cause {
     Passed,
     /// Its surroundings are too uneven for the pad to lie on.
     Uneven,
+    /// Nothing: the arm has postures there that are free, but the search looked at others.
+    Missed,
 }
 
 impl std::fmt::Display for Cause {
@@ -68,6 +70,7 @@ impl std::fmt::Display for Cause {
             Self::NoMotion => f.write_str("reached, but no motion to it was found"),
             Self::Passed => f.write_str("reached, but passed by"),
             Self::Uneven => f.write_str("too uneven for the pad"),
+            Self::Missed => f.write_str("free, but not found by the search"),
         }
     }
 }
@@ -84,8 +87,8 @@ pub struct Obstruction {
 
 /// Headings that are looked at.
 const HEADINGS: usize = 8;
-/// Redundancy values at each.
-const REDUNDANCIES: usize = 12;
+/// Redundancy values at each, as many as are looked at where a place is searched.
+const REDUNDANCIES: usize = 24;
 /// Postures that are looked at closely: slow.
 const POSTURES: usize = 24;
 
@@ -116,8 +119,11 @@ pub fn obstruction(cell: Workcell<'_>, patch: &Patch) -> Obstruction {
         }
     }
     let step = inside.len().div_ceil(POSTURES).max(1);
-    let hits = inside.iter().step_by(step).filter_map(|q| world.why_not(q, ToolContact::Allowed));
-    let nearest = hits.min_by(|a, b| short(a).total_cmp(&short(b)));
+    let looked = inside.iter().step_by(step).map(|q| world.why_not(q, ToolContact::Allowed));
+    let Some(hits) = looked.collect::<Option<Vec<Hit>>>() else {
+        return Obstruction { cause: Cause::Missed, short: 0.0 };
+    };
+    let nearest = hits.into_iter().min_by(|a, b| short(a).total_cmp(&short(b)));
     let unreached = Obstruction { cause: Cause::OutOfReach, short: 0.0 };
     let hit = nearest.map(|hit| Obstruction { short: short(&hit), cause: cause(hit, &tool.name) });
     hit.or(outside).unwrap_or(unreached)
@@ -143,5 +149,34 @@ fn cause(hit: Hit, pad: &str) -> Cause {
         With::ScanPoint(_) if link == pad => Cause::Press,
         With::ScanPoint(_) => Cause::Object { link },
         With::Unseen(_) => Cause::Unseen { link },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector3};
+    use nullsweep_collision::{Options, World};
+    use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
+
+    use super::super::reach;
+    use super::*;
+
+    #[test]
+    fn where_a_posture_is_free_nothing_is_in_the_way() {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&ArmSpec::pr2(Side::Right)).unwrap();
+        let tool = Tool::default();
+        let world = World::new(&robot, &arm, &tool, &[], &[], &Options::default()).unwrap();
+        let cell = Workcell { arm: &arm, tool: &tool, world: &world };
+        let patch = |x: f64| Patch {
+            centre: Point3::new(x, -0.3, 0.8),
+            normal: Vector3::z_axis(),
+            points: Vec::new(),
+            rmse: 0.0,
+        };
+        assert!(reach(cell, &[patch(0.6)], 24, &|| ())[0].is_some());
+        let missed = Obstruction { cause: Cause::Missed, short: 0.0 };
+        assert_eq!(obstruction(cell, &patch(0.6)), missed);
+        assert_eq!(obstruction(cell, &patch(3.0)).cause, Cause::OutOfReach);
     }
 }

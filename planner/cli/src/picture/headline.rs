@@ -5,7 +5,6 @@ use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Headline, Look, Motion, Tone};
 
-use super::motion::REACH;
 use super::points::Points;
 use super::robot::Shown;
 use super::sitter::Sitter;
@@ -60,8 +59,7 @@ pub(super) fn headline(
         .fold(f64::INFINITY, f64::min);
     if least.is_finite() {
         let detail = "of the arm without its hand, at the looked-at times".into();
-        let over = if least < 1e3 * REACH { "" } else { "over " };
-        tell("Least clearance", format!("{over}{least:.0} mm"), detail, Tone::Plain);
+        tell("Least clearance", format!("{least:.0} mm"), detail, Tone::Plain);
     }
     (headline, notes(plan, here, robot, sitter.verification))
 }
@@ -78,7 +76,8 @@ fn violations(plan: &Plan, verification: Option<&Verification>) -> (String, Stri
     let against = &found.against;
     let measured = against.surface_points + against.other_points + against.raw_points;
     let unseen = if against.unseen_points > 0 { ", unseen space" } else { "" };
-    let detail = format!("against {measured} points{unseen}, {} obstacles", against.obstacles);
+    let (obstacles, but_for) = (against.obstacles, against.but_for());
+    let detail = format!("against {measured} points{unseen}, {obstacles} obstacles{but_for}");
     let tone = if found.violations.is_empty() { Tone::Good } else { Tone::Bad };
     (found.violations.len().to_string(), detail, tone)
 }
