@@ -164,7 +164,8 @@ fn blocks(seed: u64, is_open: bool) -> (Vec<[usize; 3]>, Soup) {
                 other[axis] = at;
                 filled.contains(&other)
             });
-            if !covered && !(is_open && k == 1 && Some(cell[2]) == top) {
+            let is_opening = is_open && k == 1 && Some(cell[2]) == top;
+            if !covered && !is_opening {
                 corners.extend_from_slice(face);
             }
         }
