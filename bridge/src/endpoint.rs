@@ -9,6 +9,9 @@ use nullsweep_robot::{Arm, Continuous, JointVector};
 use crate::ear::{Ear, Heard};
 use crate::stream::{Message, Rules, Stop, Stream, Takeover};
 
+/// How often motors that are still on are asked to go off. \[ns\]
+const AGAIN_NS: u64 = 1_000_000_000;
+
 /// What is known of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Health {
@@ -21,7 +24,7 @@ pub struct Health {
 /// What the robot's side is to do.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Do {
-    /// Turn the motors on or off.
+    /// Turn the motors on or off. Off is said again while they are on.
     Power(bool),
     /// Follow this.
     Follow(Message),
@@ -42,6 +45,18 @@ pub struct Timing {
     pub stop_acceleration: f64,
 }
 
+impl Timing {
+    /// Reads [`Self::stop_acceleration`]. \[rad/s²\]
+    ///
+    /// # Errors
+    /// What is wrong with it: it is to be a number above 0.
+    pub fn read_acceleration(text: &str) -> Result<f64, String> {
+        let value = text.parse::<f64>().map_err(|why| why.to_string())?;
+        let fits = value.is_finite() && value > 0.0;
+        fits.then_some(value).ok_or_else(|| "a finite number above 0 is wanted, in rad/s²".into())
+    }
+}
+
 /// The executor's partner.
 #[derive(Debug)]
 pub struct Endpoint {
@@ -53,6 +68,8 @@ pub struct Endpoint {
     due_ns: u64,
     /// Whether the executor wants the motors off.
     disabled: bool,
+    /// When it was last said that they shall be off. \[ns\]
+    off_ns: u64,
     stopped: Option<Stop>,
 }
 
@@ -85,6 +102,7 @@ impl Endpoint {
             period_ns: timing.period_ns,
             due_ns: 0,
             disabled: false,
+            off_ns: 0,
             stopped: None,
         })
     }
@@ -125,9 +143,16 @@ impl Endpoint {
         while let Some(setpoint) = self.setpoints.receive()? {
             if (setpoint.disable != 0) != self.disabled {
                 self.disabled = setpoint.disable != 0;
+                self.off_ns = now_ns;
                 all.push(Do::Power(!self.disabled));
             }
             self.stream.take(&setpoint, &measured);
+        }
+        // A request can be lost or refused, and an executor is told that they are off.
+        let is_on = self.disabled && health.status & status::HALTED == 0;
+        if is_on && now_ns >= self.off_ns + AGAIN_NS {
+            self.off_ns = now_ns;
+            all.push(Do::Power(false));
         }
         let off = status::HALTED | status::CALIBRATED;
         if self.disabled || health.status & off != status::CALIBRATED {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use nullsweep_bridge::Timing;
 use nullsweep_ipc_types::service::DEFAULT_ROBOT;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 
@@ -50,7 +51,7 @@ pub struct RunArgs {
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(5..=1000))]
     pub timeout: u64,
     /// Deceleration of the stop that ends every message, in rad/s²
-    #[arg(long, default_value_t = 4.0)]
+    #[arg(long, default_value_t = 4.0, value_parser = Timing::read_acceleration)]
     pub stop_acceleration: f64,
     /// SCHED_FIFO priority, where permitted; 0 for the default scheduler
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u8).range(0..=99))]
