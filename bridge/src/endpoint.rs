@@ -193,3 +193,66 @@ impl Endpoint {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+    use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+    const ON: Health = Health { status: status::CALIBRATED, is_linked: true };
+    const OFF: Health = Health { status: status::CALIBRATED | status::HALTED, is_linked: true };
+
+    /// A request can be lost or refused, while the executor is told that the motors are off.
+    #[test]
+    fn motors_that_are_still_on_are_asked_again_to_go_off() {
+        let root = tempfile::tempdir().expect("a folder");
+        let ipc = Ipc::open("pr2", Some(root.path())).expect("a node");
+        let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+        let ear = Ear::new(&arm, str::to_owned);
+        let mut names = ear.names().to_vec();
+        names.extend(arm.held_joints().iter().map(|h| h.name.clone()));
+        let timing = Timing {
+            delay_ns: 60 * MS,
+            period_ns: 20 * MS,
+            timeout_ns: 20 * MS,
+            stop_acceleration: 4.0,
+        };
+        let mut endpoint =
+            Endpoint::open(&ipc, &arm, ear, &timing, Takeover::AtStamp).expect("an endpoint");
+        let executor = ipc.setpoint_sender().expect("a sender");
+        let positions = vec![0.0; names.len()];
+        let heard = Heard {
+            stamp_ns: 1000 * MS,
+            at_ns: 1000 * MS,
+            names: &names,
+            positions: &positions,
+            velocities: &[],
+            efforts: &[],
+        };
+        endpoint.hear(&heard, ON).expect("sent");
+        let send = |sequence, disable| {
+            let setpoint = Setpoint { sequence, joint_count: 7, disable, ..Setpoint::zeroed() };
+            executor.send(&setpoint).expect("sent");
+        };
+        let mut asked = |ms: u64, health| {
+            let all = endpoint.round(health, ms * MS).expect("received");
+            all.into_iter().filter(|what| matches!(what, Do::Power(_))).collect::<Vec<_>>()
+        };
+        assert_eq!(asked(1001, ON), []);
+        send(1, 1);
+        assert_eq!(asked(1002, ON), [Do::Power(false)]);
+        assert_eq!(asked(1900, ON), []);
+        assert_eq!(asked(2002, ON), [Do::Power(false)]);
+        assert_eq!(asked(2500, ON), []);
+        assert_eq!(asked(3002, ON), [Do::Power(false)]);
+        // They are off, and on again by somebody else's hand while they shall be off.
+        assert_eq!(asked(4500, OFF), []);
+        assert_eq!(asked(4501, ON), [Do::Power(false)]);
+        send(2, 0);
+        assert_eq!(asked(4502, OFF), [Do::Power(true)]);
+        assert_eq!(asked(9000, OFF), []);
+    }
+}

@@ -93,3 +93,27 @@ impl RunArgs {
         self.controller.clone().unwrap_or_else(|| own.into())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Cli {
+        #[command(flatten)]
+        run: RunArgs,
+    }
+
+    #[test]
+    fn a_stop_has_a_deceleration() {
+        let parse = |value: &str| {
+            Cli::try_parse_from(["pr2-bridge".into(), format!("--stop-acceleration={value}")])
+        };
+        assert_eq!(parse("2.5").expect("sound").run.stop_acceleration, 2.5);
+        for wrong in ["0", "-1", "NaN", "inf", "fast"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}

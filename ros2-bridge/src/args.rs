@@ -257,6 +257,15 @@ mod tests {
     }
 
     #[test]
+    fn a_stop_has_a_deceleration() {
+        let sound = parse(&["--stop-acceleration", "2.5"]).expect("sound");
+        assert_eq!(sound.timing().stop_acceleration, 2.5);
+        for wrong in ["0", "-1", "NaN", "inf", "fast"] {
+            assert!(parse(&[&format!("--stop-acceleration={wrong}")]).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
     fn held_joints_have_positions() {
         assert_eq!(held("torso_lift_joint=0.2"), Ok(("torso_lift_joint".into(), 0.2)));
         for wrong in ["torso_lift_joint", "=0.2", "a=b", "a=NaN"] {
