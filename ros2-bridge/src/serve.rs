@@ -110,6 +110,8 @@ struct Server {
     newest: Option<Telemetry>,
     /// What is to be stopped.
     brake: Brake<Asked>,
+    /// When it was last told that a stop cannot be asked for.
+    told: Option<Instant>,
 }
 
 impl Server {
@@ -140,6 +142,7 @@ impl Server {
             ended_ns: 0,
             newest: None,
             brake: Brake::default(),
+            told: None,
         })
     }
 
@@ -311,11 +314,14 @@ impl Server {
     /// Asks the executor to stop what is to be stopped.
     fn brake(&mut self) {
         let tells = self.fresh().map(|t| (t.plan, t.stamp_ns));
-        let commands = &self.commands;
+        let (commands, told) = (&self.commands, &mut self.told);
         let ask = || match commands.ask(CommandKind::Stop, 0.0) {
             Ok(asked) => Some(asked),
             Err(error) => {
-                tracing::error!("the executor cannot be asked to stop, tried again: {error}");
+                if told.is_none_or(|at| at.elapsed() > PATIENCE) {
+                    *told = Some(Instant::now());
+                    tracing::error!("the executor cannot be asked to stop, tried again: {error}");
+                }
                 None
             }
         };

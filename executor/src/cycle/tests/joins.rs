@@ -355,6 +355,20 @@ fn corners_are_summed_over_the_cycle_across_a_join() {
     // In the seam, and half a cycle after it.
     let why = only(&sim.offer(stairs(2, at, 20, MS / 2, true)), Rejected).why;
     assert_eq!((why.reason, why.joint), (Reason::Start, 0), "{why}");
+    // So many knots there that the loop would be long in summing them.
+    let mut crowd = vec![(0, at)];
+    crowd.extend((1..=12).map(|k| (k * MS / 20, moved(at, 0, 20.0 * step * 5e-5 * k as f64))));
+    let mut q = crowd[12].1;
+    for k in (0..20).rev() {
+        q[0] += step * f64::from(k) * 1e-3;
+        crowd.push((crowd[crowd.len() - 1].0 + MS, q));
+    }
+    let crowd = plan_with(&guard, 4, &crowd, |h, _| {
+        (h.corners, h.join_rule) = (0, JoinRule::AtKnot.wire());
+        (h.join_plan, h.join_knot) = (id(1), 20);
+    });
+    let why = only(&sim.offer(crowd), Rejected).why;
+    assert_eq!((why.reason, why.bound), (Reason::Malformed, 8.0), "{why}");
     only(&sim.offer(stairs(3, at, 20, MS, true)), Accepted);
 }
 
