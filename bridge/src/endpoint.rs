@@ -11,6 +11,9 @@ use crate::stream::{Message, Rules, Stop, Stream, Takeover};
 
 /// How often motors that are still on are asked to go off. \[ns\]
 const AGAIN_NS: u64 = 1_000_000_000;
+/// How long setpoints go out to a controller that does not listen: an executor's stop on its path
+/// takes no longer. One that listens again after that stands somewhere else. \[ns\]
+const UNLINKED_NS: u64 = 1_000_000_000;
 
 /// What is known of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +73,8 @@ pub struct Endpoint {
     disabled: bool,
     /// When it was last said that they shall be off. \[ns\]
     off_ns: u64,
+    /// Since when the controller does not listen. \[ns\]
+    unlinked_ns: Option<u64>,
     stopped: Option<Stop>,
 }
 
@@ -103,6 +108,7 @@ impl Endpoint {
             due_ns: 0,
             disabled: false,
             off_ns: 0,
+            unlinked_ns: None,
             stopped: None,
         })
     }
@@ -155,7 +161,10 @@ impl Endpoint {
             all.push(Do::Power(false));
         }
         let off = status::HALTED | status::CALIBRATED;
-        if self.disabled || health.status & off != status::CALIBRATED {
+        let since = (!health.is_linked).then(|| self.unlinked_ns.unwrap_or(now_ns));
+        self.unlinked_ns = since;
+        let gone = since.is_some_and(|since| now_ns >= since + UNLINKED_NS);
+        if self.disabled || gone || health.status & off != status::CALIBRATED {
             self.stream.let_go();
             all.push(Do::LetGo);
         }
@@ -254,5 +263,12 @@ mod tests {
         send(2, 0);
         assert_eq!(asked(4502, OFF), [Do::Power(true)]);
         assert_eq!(asked(9000, OFF), []);
+        // A controller that has not listened for long does not go on where it was left.
+        let gone = Health { is_linked: false, ..ON };
+        let mut lets_go = |ms: u64, health| {
+            endpoint.round(health, ms * MS).expect("received").contains(&Do::LetGo)
+        };
+        assert!(!lets_go(10_000, gone) && !lets_go(10_999, gone) && lets_go(11_000, gone));
+        assert!(!lets_go(11_001, ON) && !lets_go(11_002, gone));
     }
 }
