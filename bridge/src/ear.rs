@@ -11,6 +11,11 @@ const AHEAD_NS: u64 = 50_000_000;
 /// `/joint_states` comes at 50 Hz and more; after so long without a usable one it counts as lost.
 /// \[ns\]
 const UNHEARD_NS: u64 = 200_000_000;
+/// After so long without a word of it nobody knows where a held joint stands. Grippers and the like
+/// tell of theirs less often than an arm. \[ns\]
+const FORGOTTEN_NS: u64 = 3_000_000_000;
+/// Least time between two lines about messages that cannot be used. \[ns\]
+const TELL_NS: u64 = 2_000_000_000;
 
 /// A message of joint states.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +48,17 @@ pub enum HeardError {
     Unknown {
         /// As the messages name it.
         joint: String,
+    },
+    /// It was told once and is not any more.
+    #[error(
+        "nothing has told for {seconds:.1} s where joint {joint} stands, which plans take as fixed: \
+         does its driver run?"
+    )]
+    Forgotten {
+        /// As the messages name it.
+        joint: String,
+        /// Since it was last told. \[s\]
+        seconds: f64,
     },
     /// It has fewer positions than names.
     #[error("it has {positions} positions for {names} names")]
@@ -84,13 +100,15 @@ pub enum HeardError {
 #[derive(Clone, Debug)]
 pub struct Ear {
     names: Vec<String>,
-    /// Joints outside the arm, and where they were last told to stand.
-    held: Vec<(String, Option<f64>)>,
+    /// Joints outside the arm, where they were last told to stand, and when that came. \[ns\]
+    held: Vec<(String, Option<(f64, u64)>)>,
     measured: Option<JointVector>,
     /// When the last usable one came. \[ns\]
     heard_ns: u64,
     sequence: u64,
     warned: bool,
+    /// When a message was last told to be of no use. \[ns\]
+    warned_ns: Option<u64>,
 }
 
 impl Ear {
@@ -103,6 +121,7 @@ impl Ear {
             heard_ns: 0,
             sequence: 0,
             warned: false,
+            warned_ns: None,
         }
     }
 
@@ -131,7 +150,7 @@ impl Ear {
     }
 
     /// The state; `None` for a message without the arm's joints, or one that cannot be used: the
-    /// first such one is told.
+    /// first such one is told, where they come in turns with others not each of them.
     pub fn hear(&mut self, heard: &Heard<'_>) -> Option<JointStates> {
         match self.read(heard) {
             Ok(state) => {
@@ -139,12 +158,22 @@ impl Ear {
                 state
             }
             Err(why) => {
-                if !std::mem::replace(&mut self.warned, true) {
+                if self.is_news(heard.at_ns) {
                     tracing::error!("/joint_states cannot be used: {why}");
                 }
                 None
             }
         }
+    }
+
+    /// Whether a message that cannot be used is to be told.
+    fn is_news(&mut self, now_ns: u64) -> bool {
+        let lately = self.warned_ns.is_some_and(|at| now_ns.saturating_sub(at) < TELL_NS);
+        if self.warned || lately {
+            return false;
+        }
+        (self.warned, self.warned_ns) = (true, Some(now_ns));
+        true
     }
 
     /// As [`Self::hear`], with the reason.
@@ -164,7 +193,7 @@ impl Ear {
         // Others than the arm's driver may tell of grippers and the like, in messages of their own.
         for (name, stands) in &mut self.held {
             if let Some(index) = find(name) {
-                *stands = Some(finite(name, positions[index])?);
+                *stands = Some((finite(name, positions[index])?, at_ns));
             }
         }
         if !self.names.iter().any(|name| find(name).is_some()) {
@@ -189,8 +218,14 @@ impl Ear {
             return Err(HeardError::TooMany { count: self.held.len() });
         }
         for (h, (name, stands)) in self.held.iter().enumerate() {
-            state.held_positions[h] =
+            let (position, told_ns) =
                 stands.ok_or_else(|| HeardError::Unknown { joint: name.clone() })?;
+            let age_ns = at_ns.saturating_sub(told_ns);
+            if age_ns > FORGOTTEN_NS {
+                let seconds = age_ns as f64 * 1e-9;
+                return Err(HeardError::Forgotten { joint: name.clone(), seconds });
+            }
+            state.held_positions[h] = position;
         }
         self.heard_ns = at_ns;
         self.sequence += 1;
@@ -284,5 +319,35 @@ mod tests {
         assert_eq!(ear.read(&heard(&names[..split], &positions[..split], 0)), Ok(None));
         let state = ear.read(&arm).expect("sound").expect("one");
         assert_eq!(state.held_positions[0], positions[1]);
+        // A driver that died leaves no place for ever.
+        let later = |seconds: u64| {
+            let at_ns = 10_000_000_000 + seconds * 1_000_000_000;
+            Heard { stamp_ns: at_ns, at_ns, ..arm }
+        };
+        assert!(matches!(ear.read(&later(3)), Ok(Some(_))));
+        let forgotten = ear.read(&later(4)).unwrap_err();
+        assert!(matches!(forgotten, HeardError::Forgotten { seconds: 4.0, .. }), "{forgotten}");
+        let back =
+            Heard { at_ns: later(4).at_ns, ..heard(&names[..split], &positions[..split], 0) };
+        assert_eq!(ear.read(&back), Ok(None));
+        assert!(matches!(ear.read(&later(5)), Ok(Some(_))));
+    }
+
+    /// Two senders of the same joints, one of which has a wrong clock.
+    #[test]
+    fn what_comes_in_turns_is_not_told_each_time() {
+        let mut ear = ear();
+        let (names, positions) = message(&ear);
+        let mut lines = 0;
+        for k in 0..1000u64 {
+            let at_ns = 10_000_000_000 + k * 10_000_000;
+            let stamp_ns = if k % 2 == 0 { at_ns } else { at_ns - 800_000_000 };
+            let heard = Heard { stamp_ns, at_ns, ..heard(&names, &positions, 0) };
+            match ear.read(&heard) {
+                Ok(_) => ear.warned = false,
+                Err(_) => lines += u32::from(ear.is_news(at_ns)),
+            }
+        }
+        assert_eq!(lines, 5);
     }
 }

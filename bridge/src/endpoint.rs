@@ -9,6 +9,12 @@ use nullsweep_robot::{Arm, Continuous, JointVector};
 use crate::ear::{Ear, Heard};
 use crate::stream::{Message, Rules, Stop, Stream, Takeover};
 
+/// How often motors that are still on are asked to go off. \[ns\]
+const AGAIN_NS: u64 = 1_000_000_000;
+/// How long setpoints go out to a controller that does not listen: an executor's stop on its path
+/// takes no longer. One that listens again after that stands somewhere else. \[ns\]
+const UNLINKED_NS: u64 = 1_000_000_000;
+
 /// What is known of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Health {
@@ -21,7 +27,7 @@ pub struct Health {
 /// What the robot's side is to do.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Do {
-    /// Turn the motors on or off.
+    /// Turn the motors on or off. Off is said again while they are on.
     Power(bool),
     /// Follow this.
     Follow(Message),
@@ -42,6 +48,18 @@ pub struct Timing {
     pub stop_acceleration: f64,
 }
 
+impl Timing {
+    /// Reads [`Self::stop_acceleration`]. \[rad/s²\]
+    ///
+    /// # Errors
+    /// What is wrong with it: it is to be a number above 0.
+    pub fn read_acceleration(text: &str) -> Result<f64, String> {
+        let value = text.parse::<f64>().map_err(|why| why.to_string())?;
+        let fits = value.is_finite() && value > 0.0;
+        fits.then_some(value).ok_or_else(|| "a finite number above 0 is wanted, in rad/s²".into())
+    }
+}
+
 /// The executor's partner.
 #[derive(Debug)]
 pub struct Endpoint {
@@ -53,6 +71,10 @@ pub struct Endpoint {
     due_ns: u64,
     /// Whether the executor wants the motors off.
     disabled: bool,
+    /// When it was last said that they shall be off. \[ns\]
+    off_ns: u64,
+    /// Since when the controller does not listen. \[ns\]
+    unlinked_ns: Option<u64>,
     stopped: Option<Stop>,
 }
 
@@ -85,6 +107,8 @@ impl Endpoint {
             period_ns: timing.period_ns,
             due_ns: 0,
             disabled: false,
+            off_ns: 0,
+            unlinked_ns: None,
             stopped: None,
         })
     }
@@ -125,12 +149,22 @@ impl Endpoint {
         while let Some(setpoint) = self.setpoints.receive()? {
             if (setpoint.disable != 0) != self.disabled {
                 self.disabled = setpoint.disable != 0;
+                self.off_ns = now_ns;
                 all.push(Do::Power(!self.disabled));
             }
             self.stream.take(&setpoint, &measured);
         }
+        // A request can be lost or refused, and an executor is told that they are off.
+        let is_on = self.disabled && health.status & status::HALTED == 0;
+        if is_on && now_ns >= self.off_ns + AGAIN_NS {
+            self.off_ns = now_ns;
+            all.push(Do::Power(false));
+        }
         let off = status::HALTED | status::CALIBRATED;
-        if self.disabled || health.status & off != status::CALIBRATED {
+        let since = (!health.is_linked).then(|| self.unlinked_ns.unwrap_or(now_ns));
+        self.unlinked_ns = since;
+        let gone = since.is_some_and(|since| now_ns >= since + UNLINKED_NS);
+        if self.disabled || gone || health.status & off != status::CALIBRATED {
             self.stream.let_go();
             all.push(Do::LetGo);
         }
@@ -166,5 +200,75 @@ impl Endpoint {
             self.stream.late,
             self.stream.refused
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+    use nullsweep_robot::{ArmSpec, Robot, Side};
+
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+    const ON: Health = Health { status: status::CALIBRATED, is_linked: true };
+    const OFF: Health = Health { status: status::CALIBRATED | status::HALTED, is_linked: true };
+
+    /// A request can be lost or refused, while the executor is told that the motors are off.
+    #[test]
+    fn motors_that_are_still_on_are_asked_again_to_go_off() {
+        let root = tempfile::tempdir().expect("a folder");
+        let ipc = Ipc::open("pr2", Some(root.path())).expect("a node");
+        let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+        let ear = Ear::new(&arm, str::to_owned);
+        let mut names = ear.names().to_vec();
+        names.extend(arm.held_joints().iter().map(|h| h.name.clone()));
+        let timing = Timing {
+            delay_ns: 60 * MS,
+            period_ns: 20 * MS,
+            timeout_ns: 20 * MS,
+            stop_acceleration: 4.0,
+        };
+        let mut endpoint =
+            Endpoint::open(&ipc, &arm, ear, &timing, Takeover::AtStamp).expect("an endpoint");
+        let executor = ipc.setpoint_sender().expect("a sender");
+        let positions = vec![0.0; names.len()];
+        let heard = Heard {
+            stamp_ns: 1000 * MS,
+            at_ns: 1000 * MS,
+            names: &names,
+            positions: &positions,
+            velocities: &[],
+            efforts: &[],
+        };
+        endpoint.hear(&heard, ON).expect("sent");
+        let send = |sequence, disable| {
+            let setpoint = Setpoint { sequence, joint_count: 7, disable, ..Setpoint::zeroed() };
+            executor.send(&setpoint).expect("sent");
+        };
+        let mut asked = |ms: u64, health| {
+            let all = endpoint.round(health, ms * MS).expect("received");
+            all.into_iter().filter(|what| matches!(what, Do::Power(_))).collect::<Vec<_>>()
+        };
+        assert_eq!(asked(1001, ON), []);
+        send(1, 1);
+        assert_eq!(asked(1002, ON), [Do::Power(false)]);
+        assert_eq!(asked(1900, ON), []);
+        assert_eq!(asked(2002, ON), [Do::Power(false)]);
+        assert_eq!(asked(2500, ON), []);
+        assert_eq!(asked(3002, ON), [Do::Power(false)]);
+        // They are off, and on again by somebody else's hand while they shall be off.
+        assert_eq!(asked(4500, OFF), []);
+        assert_eq!(asked(4501, ON), [Do::Power(false)]);
+        send(2, 0);
+        assert_eq!(asked(4502, OFF), [Do::Power(true)]);
+        assert_eq!(asked(9000, OFF), []);
+        // A controller that has not listened for long does not go on where it was left.
+        let gone = Health { is_linked: false, ..ON };
+        let mut lets_go = |ms: u64, health| {
+            endpoint.round(health, ms * MS).expect("received").contains(&Do::LetGo)
+        };
+        assert!(!lets_go(10_000, gone) && !lets_go(10_999, gone) && lets_go(11_000, gone));
+        assert!(!lets_go(11_001, ON) && !lets_go(11_002, gone));
     }
 }

@@ -1,7 +1,7 @@
 //! The other way round: a trajectory that some program has for a controller, as a plan for the
 //! executor.
 
-use nullsweep_executor::{Guard, PlanKnot, top_acceleration, top_speed};
+use nullsweep_executor::{Guard, PlanKnot, ends, top_acceleration, top_jerk, top_speed};
 use nullsweep_ipc_types::{Interpolation, Knot, MAX_KNOTS};
 use nullsweep_robot::JointVector;
 
@@ -9,7 +9,7 @@ use nullsweep_robot::JointVector;
 const SLOWER: f64 = 1.2;
 /// The least time to the first point. \[s\]
 const SHORTEST: f64 = 0.02;
-/// The longest: what is not reached within it is refused. \[s\]
+/// How much later than it was wished the first point may be reached. \[s\]
 const LONGEST: f64 = 60.0;
 /// What of each limit the way to the first point uses.
 const SHARE: f64 = 0.9;
@@ -70,7 +70,10 @@ pub enum FrontError {
         points: usize,
     },
     /// No time is long enough.
-    #[error("its first point ahead is not reached within {LONGEST} s from where the arm holds")]
+    #[error(
+        "its first point ahead is not reached within the arm's limits from where it holds, even \
+         {LONGEST} s later"
+    )]
     Unreachable,
 }
 
@@ -90,8 +93,10 @@ pub fn front(
     let ahead = points.partition_point(|p| passed_ns > 0 && p.after_ns <= passed_ns);
     let mut rest = &points[ahead..];
     let there = |p: &Waypoint| guard.farthest(holds, &p.q, guard.start_tolerance).is_none();
-    // Its first point says where it begins, at time 0, or where it was thought to.
-    let starts_there = ahead == 0 && rest.first().is_some_and(|p| p.after_ns == 0 && there(p));
+    // Its first point says where it begins, at time 0, or where it was thought to. Where it is all
+    // that there is, it is gone to.
+    let first_there = rest.first().is_some_and(|p| p.after_ns == 0 && there(p));
+    let starts_there = ahead == 0 && first_there && rest.len() > 1;
     if !starts_there && rest.len() > 1 && rest[0].after_ns == 0 {
         rest = &rest[1..];
     }
@@ -114,7 +119,11 @@ pub fn front(
     let lead_ns = if starts_there {
         0
     } else {
-        lead(&start, |time_ns| at(time_ns, first), wished_ns, interpolation, guard)?
+        let next = rest.get(1).map(|p| at(p.after_ns - first.after_ns, p));
+        let onward = next.map_or(JointVector::ZERO, |next| {
+            JointVector::from_fn(|j| ends(&at(0, first), &next, interpolation, j)[0])
+        });
+        lead(&start, |time_ns| at(time_ns, first), &onward, wished_ns, interpolation, guard)?
     };
     let begin = (!starts_there).then_some(start);
     let rest = rest.iter().map(|p| at(p.after_ns - first.after_ns + lead_ns, p));
@@ -141,22 +150,25 @@ fn check(points: &[Waypoint]) -> Result<(), FrontError> {
     Ok(())
 }
 
-/// The time to the first point from rest, at least as long as wished, within each joint's limits.
-/// \[ns\]
+/// The time to the first point from rest, at least as long as wished, within each joint's limits; it
+/// goes on from there with the acceleration `onward`. \[ns\]
 fn lead(
     start: &PlanKnot,
     first: impl Fn(u64) -> PlanKnot,
+    onward: &JointVector,
     wished_ns: u64,
     kind: Interpolation,
     guard: &Guard,
 ) -> Result<u64, FrontError> {
-    let mut seconds = (wished_ns as f64 * 1e-9).max(SHORTEST);
-    while seconds <= LONGEST {
+    let wished = (wished_ns as f64 * 1e-9).max(SHORTEST);
+    let mut seconds = wished;
+    while seconds <= wished + LONGEST {
         let end = first((seconds * 1e9) as u64);
         let fits = guard.used().iter().enumerate().all(|(j, bound)| {
             let limits = &bound.limits;
             top_speed(start, &end, kind, j) <= SHARE * limits.velocity
                 && top_acceleration(start, &end, kind, j) <= SHARE * limits.acceleration
+                && is_smooth(start, &end, onward[j], kind, j, guard)
         });
         if fits {
             return Ok((seconds * 1e9) as u64);
@@ -164,6 +176,24 @@ fn lead(
         seconds *= SLOWER;
     }
     Err(FrontError::Unreachable)
+}
+
+/// Whether a joint's jerk limit, where it has one, lets it begin so from rest and go on so.
+fn is_smooth(
+    start: &PlanKnot,
+    end: &PlanKnot,
+    onward: f64,
+    kind: Interpolation,
+    j: usize,
+    guard: &Guard,
+) -> bool {
+    let Some(jerk) = guard.joints[j].limits.jerk else { return true };
+    let ([begins, comes], own) = (ends(start, end, kind, j), top_jerk(start, end, kind, j));
+    // In one cycle the step and the jerk beside it are seen.
+    let beside = own * guard.period();
+    own <= SHARE * jerk
+        && begins.abs() + beside <= SHARE * guard.sudden(j)
+        && (onward - comes).abs() + beside <= SHARE * guard.sudden(j)
 }
 
 fn wire(knot: &PlanKnot) -> Knot {
@@ -246,6 +276,60 @@ mod tests {
         assert_eq!(found.interpolation, Interpolation::Linear);
         assert!((found.knots[1].positions[6] - 2.0 * turn - 0.1).abs() < 1e-12, "{found:?}");
         assert!((found.knots[2].positions[6] - 2.0 * turn - 0.2).abs() < 1e-12, "{found:?}");
+    }
+
+    /// A slow motion to one point, as a teach pendant has it.
+    #[test]
+    fn one_point_may_be_far_in_time_or_where_the_arm_is() {
+        let found = front(&[point(90_000, 0.5, 0.0)], 0, &JointVector::ZERO, &guard());
+        let found = found.expect("a plan");
+        assert_eq!((found.knots[1].time_from_start_ns, found.later_ns), (90_000 * MS, 0));
+        let found = front(&[point(0, 0.001, 0.0)], 0, &JointVector::ZERO, &guard());
+        let found = found.expect("a plan");
+        assert_eq!(found.knots.len(), 2);
+        assert_eq!((found.knots[0].positions[0], found.knots[1].positions[0]), (0.0, 0.001));
+    }
+
+    /// With a jerk limit a cubic from rest begins with a step of the acceleration, which the executor
+    /// bounds: so slowly that it is none.
+    #[test]
+    fn the_way_to_the_first_point_keeps_a_jerk_limit() {
+        let mut guard = guard();
+        guard.joints[0].limits.jerk = Some(500.0);
+        let found = front(&[point(100, 0.1, 0.0)], 0, &JointVector::ZERO, &guard);
+        let knots = found.expect("a plan").knots;
+        let held = nullsweep_executor::Held {
+            positions: [0.0; nullsweep_ipc_types::MAX_HELD_JOINTS],
+            count: 0,
+        };
+        let rules = nullsweep_executor::Rules {
+            guard,
+            fingerprint: 1,
+            held_continuous: Vec::new(),
+            held_tolerance: 0.01,
+            since_ns: 1,
+        };
+        let mut header = nullsweep_ipc_types::PlanHeader {
+            id: nullsweep_ipc_types::PlanId { epoch: 2, number: 1 },
+            fingerprint: 1,
+            joint_count: 7,
+            knot_count: 2,
+            interpolation: Interpolation::Cubic.wire(),
+            ..Default::default()
+        };
+        // Joint 3's and 5's soft limits leave out 0.
+        let home = JointVector::from_fn(|j| if j == 3 || j == 5 { -1.0 } else { 0.0 });
+        let mut knots = knots;
+        for knot in &mut knots {
+            (knot.positions[3], knot.positions[5]) = (home[3], home[5]);
+        }
+        header.checksum = nullsweep_ipc_types::checksum(nullsweep_ipc_types::PlanMessage {
+            header: &header,
+            knots: &knots,
+        });
+        let admitted = nullsweep_executor::admit(&header, &knots, Some(&held), &rules, 3);
+        let plan = admitted.expect("admitted");
+        nullsweep_executor::starts_at(&plan, &home, &rules.guard).expect("starts");
     }
 
     #[test]

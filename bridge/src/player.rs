@@ -8,14 +8,40 @@ use nullsweep_robot::JointVector;
 
 use crate::stream::Message;
 
+/// How soon a gap is won back, as [`Playout`](crate::Playout) does. \[s\]
+const SETTLE: f64 = 0.3;
+/// How fast it is played at most: a gap is won back by going faster.
+const FASTEST: f64 = 1.5;
+
+/// The moment that is played.
+#[derive(Clone, Copy, Debug)]
+struct Head {
+    /// When it was looked. \[ns\]
+    looked_ns: u64,
+    /// What was played then: behind that after a gap. \[ns\]
+    at: f64,
+    /// How fast it goes on.
+    rate: f64,
+}
+
 /// What is followed: each message from its stamp on, as [`Takeover::AtStamp`](crate::Takeover) says.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Player {
+    /// What is played at most from one look to the next: of a longer gap no more is made up at once, so
+    /// that it is no jump. \[ns\]
+    gap_ns: u64,
     /// Where the joints are when, from the last one that has passed on.
     knots: VecDeque<PlanKnot>,
+    head: Option<Head>,
 }
 
 impl Player {
+    /// One that is asked each `period_ns`.
+    #[must_use]
+    pub fn new(period_ns: u64) -> Self {
+        Self { gap_ns: 2 * period_ns, knots: VecDeque::new(), head: None }
+    }
+
     /// Takes a message that was made for a controller that splices at the stamp.
     pub fn take(&mut self, message: &Message) {
         let (Some(first), start) = (message.points.first(), message.start_ns as f64) else {
@@ -33,13 +59,37 @@ impl Player {
     }
 
     /// Where the joints are to be at a moment that is not before the last one asked for; `None`
-    /// before the first message. \[rad\], \[rad/s\]
+    /// before the first message. Where it was not asked for a while, it goes on from where it was,
+    /// and is where it should be again a little later, or when the joints stand. \[rad\], \[rad/s\]
     pub fn at(&mut self, now_ns: u64) -> Option<Sample> {
-        let found = self.seek(now_ns as f64);
-        while self.knots.get(1).is_some_and(|next| next.time <= now_ns as f64) {
+        let head = self.turn(now_ns);
+        let found = self.seek(head.at);
+        while self.knots.get(1).is_some_and(|next| next.time <= head.at) {
             self.knots.pop_front();
         }
-        found
+        found.map(|s| Sample { v: JointVector::from_fn(|j| s.v[j] * head.rate), ..s })
+    }
+
+    /// Goes on to a moment.
+    fn turn(&mut self, now_ns: u64) -> Head {
+        let now = now_ns as f64;
+        let mut head = self.head.unwrap_or(Head { looked_ns: now_ns, at: now, rate: 1.0 });
+        let passed = now_ns.saturating_sub(head.looked_ns).min(self.gap_ns) as f64;
+        let seconds = passed * 1e-9;
+        let behind = (now - head.at - passed) * 1e-9;
+        // Critically damped, and never back.
+        let change = behind / (SETTLE * SETTLE) - 2.0 * (head.rate - 1.0) / SETTLE;
+        head.rate = (head.rate + change * seconds).clamp(1.0, FASTEST);
+        head.looked_ns = now_ns;
+        head.at += passed * head.rate;
+        // Where the joints stand nothing is left out.
+        if let Some(first) = self.knots.front() {
+            head.at = head.at.max(first.time.min(now));
+        }
+        if head.at >= now || self.knots.back().is_none_or(|last| last.time <= head.at) {
+            (head.at, head.rate) = (now, 1.0);
+        }
+        *self.head.insert(head)
     }
 
     /// Forgets all, because the arm's motors are off.
@@ -74,7 +124,7 @@ mod tests {
 
     #[test]
     fn a_message_takes_over_at_its_stamp_and_the_last_one_comes_to_rest() {
-        let mut player = Player::default();
+        let mut player = Player::new(MS);
         assert!(player.at(0).is_none());
         let message = |sequence, start_ms: u64, points: Vec<Point>| Message {
             sequence,
@@ -100,5 +150,40 @@ mod tests {
         assert_eq!(player.at(300 * MS).map(|s| (s.q[0], s.v[0])), Some((0.06, 0.0)));
         player.let_go();
         assert!(player.at(301 * MS).is_none());
+    }
+
+    /// 0.5 rad/s for 100 ms, and a stop within 125 ms.
+    fn moving() -> Player {
+        let mut player = Player::new(MS);
+        let ease = point(225, 0.05 + 0.5 * 0.0625, 0.0);
+        let points = vec![point(0, 0.0, 0.5), point(100, 0.05, 0.5), ease];
+        player.take(&Message { sequence: 1, start_ns: 100 * MS, points });
+        player
+    }
+
+    /// A program that got no time asks late: the arm goes on from where it is, at no more than its
+    /// speed, and comes to rest where it should.
+    #[test]
+    fn a_stall_is_no_jump() {
+        for stalled in [60, 150, 500] {
+            let mut player = moving();
+            let (mut before, mut top, mut rest) = (0.0, 0.0f64, 0);
+            let mut speed = 0.0;
+            for ms in (50..150).chain(150 + stalled..1500) {
+                let at = player.at(ms * MS).expect("a place");
+                let most = if ms == 150 + stalled { 1.1e-3 } else { 0.75e-3 };
+                assert!((at.q[0] - before).abs() <= most + 1e-9, "{ms}: {before} to {}", at.q[0]);
+                if ms > 150 + stalled {
+                    assert!((at.v[0] - speed).abs() < 0.01, "{ms}: {speed} to {}", at.v[0]);
+                }
+                (before, speed) = (at.q[0], at.v[0]);
+                top = top.max(at.v[0]);
+                if at.v[0] == 0.0 && at.q[0] > 0.08 && rest == 0 {
+                    rest = ms;
+                }
+            }
+            assert!((before - 0.08125).abs() < 1e-12 && top < 0.75, "{before}, {top}");
+            assert!(rest < 500 + stalled, "{rest}");
+        }
     }
 }

@@ -49,6 +49,36 @@ struct Running {
     /// When its time 0 is. \[ns\]
     start_ns: u64,
     started: bool,
+    /// When the controller said that it has come to its end, and since when the arm is measured
+    /// there. \[ns\]
+    ended_ns: Option<u64>,
+    there_ns: Option<u64>,
+}
+
+impl Running {
+    /// Where it ends, and whether the arm is measured there for long enough; `None` while neither is
+    /// decided.
+    fn judge(
+        &mut self,
+        measured: Option<&JointVector>,
+        guard: &Guard,
+        now_ns: u64,
+    ) -> Option<Rejection> {
+        let ended_ns = self.ended_ns?;
+        let far = Rejection::new(Reason::Goal);
+        let last = self.plan.knots().last().map(|k| k.q);
+        let off = match (measured, last) {
+            (Some(measured), Some(last)) => guard.farthest(measured, &last, guard.goal_tolerance),
+            _ => return Some(far),
+        };
+        let Some((joint, by)) = off else {
+            let since = *self.there_ns.get_or_insert(now_ns);
+            return (now_ns >= since + guard.settle_ns).then_some(Rejection::new(Reason::None));
+        };
+        self.there_ns = None;
+        let late = now_ns >= ended_ns + guard.goal_ns;
+        late.then(|| far.joint(joint).value(by, guard.goal_tolerance))
+    }
 }
 
 /// The executor's part for whole plans.
@@ -60,6 +90,8 @@ pub struct Whole {
     ids: Ids,
     state: Option<JointStates>,
     running: Option<Running>,
+    /// What the arm is on until the running one starts.
+    before: Option<Running>,
     event_count: u64,
     sample_count: u64,
     told_ns: u64,
@@ -90,6 +122,7 @@ impl Whole {
             ids: Ids::default(),
             state: None,
             running: None,
+            before: None,
             event_count: 0,
             sample_count: 0,
             told_ns: 0,
@@ -132,8 +165,28 @@ impl Whole {
             && now >= running.start_ns
         {
             running.started = true;
+            self.before = None;
             let id = running.plan.id();
             self.tell(id, EventKind::Started, Rejection::new(Reason::None))?;
+        }
+        let measured = self.state.map(|s| self.joints(&s));
+        let guard = self.rules.guard;
+        if let Some(why) =
+            self.running.as_mut().and_then(|r| r.judge(measured.as_ref(), &guard, now))
+            && let Some(running) = self.running.take()
+        {
+            let id = running.plan.id();
+            let kind = match why.reason {
+                Reason::None => EventKind::Finished,
+                _ => EventKind::Aborted,
+            };
+            if kind == EventKind::Aborted {
+                tracing::error!("plan {id} did not come to its end: {why}");
+            }
+            self.tell(id, kind, why)?;
+        }
+        if self.running.is_none() {
+            self.before = None;
         }
         if !ready && let Some(running) = self.running.take() {
             asks.push(Ask::Hold);
@@ -147,16 +200,20 @@ impl Whole {
         Ok(asks)
     }
 
-    /// Takes the end of a goal in: `failed` says why where it is not as planned.
+    /// Takes the end of a goal in: `failed` says why where it is not as planned. Else its plan has
+    /// ended once the arm is measured there.
     ///
     /// # Errors
     /// [`PortError`] where it cannot be told.
     pub fn ended(&mut self, goal: &str, failed: Option<&str>) -> Result<(), PortError> {
+        let Some(why) = failed else {
+            if let Some(running) = self.running.as_mut().filter(|r| r.goal == goal) {
+                running.ended_ns = Some(now_ns());
+            }
+            return Ok(());
+        };
         let Some(running) = self.running.take_if(|r| r.goal == goal) else { return Ok(()) };
         let id = running.plan.id();
-        let Some(why) = failed else {
-            return self.tell(id, EventKind::Finished, Rejection::new(Reason::None));
-        };
         tracing::error!("plan {id} ended by the controller: {why}");
         self.tell(id, EventKind::Aborted, Rejection::new(Reason::Fault))
     }
@@ -176,10 +233,14 @@ impl Whole {
     fn fit(&self, plan: &ValidPlan, ready: bool) -> Result<u64, Rejection> {
         let state = self.state.filter(|_| ready).ok_or(Rejection::new(Reason::NotReady))?;
         let guard = &self.rules.guard;
-        let measured =
-            JointVector::from_fn(|j| if j < guard.dof { state.positions[j] } else { 0.0 });
+        let measured = self.joints(&state);
         let running = self.running.as_ref().map(|r| (&r.plan, r.start_ns));
         fit(plan, running, &measured, guard, now_ns())
+    }
+
+    /// The arm's joints as a state tells them.
+    fn joints(&self, state: &JointStates) -> JointVector {
+        JointVector::from_fn(|j| if j < self.rules.guard.dof { state.positions[j] } else { 0.0 })
     }
 
     /// The plan as a goal.
@@ -201,10 +262,20 @@ impl Whole {
         };
         let waited = now_ns().saturating_sub(id.epoch) as f64 * 1e-9;
         let told = Rejection::new(Reason::None).value(waited, plan.duration() * 1e-9);
-        let running = Running { goal: goal.id.clone(), plan, start_ns, started: false };
+        let running = Running {
+            goal: goal.id.clone(),
+            plan,
+            start_ns,
+            started: false,
+            ended_ns: None,
+            there_ns: None,
+        };
         self.tell(id, EventKind::Accepted, told)?;
         if let Some(old) = self.running.replace(running) {
             self.tell(old.plan.id(), EventKind::Superseded, Rejection::new(Reason::None))?;
+            if old.started {
+                self.before = Some(old);
+            }
         }
         Ok(goal)
     }
@@ -239,7 +310,7 @@ impl Whole {
             sample.measured = state.positions;
             sample.commanded = state.positions;
         }
-        if let Some(r) = self.running.as_ref().filter(|r| now >= r.start_ns) {
+        if let Some(r) = moving(self.running.as_ref(), self.before.as_ref(), now) {
             sample.mode = Mode::Executing.wire();
             sample.plan = r.plan.id();
             sample.unverified = u32::from(!r.plan.is_verified());
@@ -250,6 +321,15 @@ impl Whole {
         self.telemetry.send(&sample)?;
         Ok(())
     }
+}
+
+/// What the arm is on: the one before until its successor's time 0.
+fn moving<'a>(
+    running: Option<&'a Running>,
+    before: Option<&'a Running>,
+    now_ns: u64,
+) -> Option<&'a Running> {
+    running.filter(|r| now_ns >= r.start_ns).or(before)
 }
 
 /// When the plan's time 0 is, if it fits the moment: what runs with its time 0, and where the arm is.

@@ -84,7 +84,7 @@ pub fn top_speed(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> f
 /// The accelerations of joint `j` at both ends of a curve, between which it is linear in time. A
 /// straight segment has none but in its corners. \[rad/s²\]
 #[must_use]
-pub(crate) fn ends(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> [f64; 2] {
+pub fn ends(a: &PlanKnot, b: &PlanKnot, kind: Interpolation, j: usize) -> [f64; 2] {
     match kind {
         Interpolation::Linear => [0.0; 2],
         Interpolation::Cubic => {

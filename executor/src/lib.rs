@@ -51,7 +51,9 @@ pub use fit::{joins_at, starts_at};
 pub use guard::{Guard, JointGuard};
 pub use hardware::{Hardware, IpcHardware, Loopback};
 pub use ids::Ids;
-pub use interpolate::{PlanKnot, Sample, reach, sample, top_acceleration, top_jerk, top_speed};
+pub use interpolate::{
+    PlanKnot, Sample, ends, reach, sample, top_acceleration, top_jerk, top_speed,
+};
 pub use nullsweep_robot::{JointVector, MAX_DOF};
 pub use path::{Path, Progress};
 pub use record::{ReplayError, Replayed, replay};

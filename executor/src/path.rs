@@ -29,6 +29,9 @@ pub struct Path {
     /// Whole turns added to the plan's continuous joints. \[rad\]
     shift: JointVector,
     connector: Connector,
+    /// Path time from its beginning to the plan's first knot: on the connector, and at rest there
+    /// for a cycle, where a joint's acceleration has to be 0 before it may rise again. \[ns\]
+    lead: f64,
     progress: Progress,
 }
 
@@ -39,8 +42,11 @@ impl Path {
         let shift = shift(&plan, from, guard);
         let first = plan.knots().first().map_or(*from, |k| k.q + shift);
         let connector = Connector::new(from, &first, guard);
-        let progress = Progress { time: -connector.duration, rate, segment: 0 };
-        Self { plan, shift, connector, progress }
+        let jerky = guard.used().iter().any(|joint| joint.limits.jerk.is_some());
+        let rests = jerky && connector.duration > 0.0;
+        let lead = connector.duration + if rests { guard.period_ns as f64 } else { 0.0 };
+        let progress = Progress { time: -lead, rate, segment: 0 };
+        Self { plan, shift, connector, lead, progress }
     }
 
     /// The plan entered at its first knot at full motion, `time` past it. `at` is the first
@@ -55,7 +61,8 @@ impl Path {
     ) -> Self {
         let shift = shift(&plan, at, guard);
         let progress = Progress { time: 0.0, rate, segment: 0 };
-        let mut path = Self { plan, shift, connector: Connector::none(at), progress };
+        let connector = Connector::none(at);
+        let mut path = Self { plan, shift, connector, lead: 0.0, progress };
         path.seek(time);
         path
     }
@@ -170,7 +177,7 @@ impl Path {
 
     fn sample_at(&self, at: Progress) -> Sample {
         if at.time < 0.0 {
-            return self.connector.sample(at.time + self.connector.duration, at.rate);
+            return self.connector.sample(at.time + self.lead, at.rate);
         }
         let knots = self.plan.knots();
         let (Some(a), Some(b)) = (knots.get(at.segment), knots.get(at.segment + 1)) else {
@@ -238,6 +245,9 @@ impl Connector {
     fn sample(&self, elapsed: f64, rate: f64) -> Sample {
         let total = self.duration * 1e-9;
         let t = within(elapsed * 1e-9, 0.0, total);
+        if t >= total {
+            return Sample { q: self.to, v: JointVector::ZERO };
+        }
         let (a, rise) = (self.acceleration, self.rise);
         let (share, speed) = if t <= rise {
             (0.5 * a * t * t, a * t)

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use nullsweep_bridge::Timing;
 use nullsweep_ipc_types::service::DEFAULT_ROBOT;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 
@@ -50,7 +51,7 @@ pub struct RunArgs {
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(5..=1000))]
     pub timeout: u64,
     /// Deceleration of the stop that ends every message, in rad/s²
-    #[arg(long, default_value_t = 4.0)]
+    #[arg(long, default_value_t = 4.0, value_parser = Timing::read_acceleration)]
     pub stop_acceleration: f64,
     /// SCHED_FIFO priority, where permitted; 0 for the default scheduler
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u8).range(0..=99))]
@@ -90,5 +91,29 @@ impl RunArgs {
             ArmSide::Right => "/r_arm_controller",
         };
         self.controller.clone().unwrap_or_else(|| own.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Cli {
+        #[command(flatten)]
+        run: RunArgs,
+    }
+
+    #[test]
+    fn a_stop_has_a_deceleration() {
+        let parse = |value: &str| {
+            Cli::try_parse_from(["pr2-bridge".into(), format!("--stop-acceleration={value}")])
+        };
+        assert_eq!(parse("2.5").expect("sound").run.stop_acceleration, 2.5);
+        for wrong in ["0", "-1", "NaN", "inf", "fast"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
     }
 }

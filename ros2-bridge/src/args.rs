@@ -98,7 +98,7 @@ pub struct RunArgs {
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(5..=1000))]
     pub timeout: u64,
     /// Deceleration of the stop that ends every message, in rad/s²
-    #[arg(long, default_value_t = 4.0)]
+    #[arg(long, default_value_t = 4.0, value_parser = Timing::read_acceleration)]
     pub stop_acceleration: f64,
     /// SCHED_FIFO priority, where permitted; 0 for the default scheduler
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u8).range(0..=99))]
@@ -254,6 +254,15 @@ mod tests {
         assert_eq!((args.takeover(), args.timing().period_ns), (Takeover::AtStamp, 10_000_000));
         let args = parse(&["--interface", "position"]).expect("sound");
         assert_eq!((args.takeover(), args.period()), (Takeover::AtStamp, 2));
+    }
+
+    #[test]
+    fn a_stop_has_a_deceleration() {
+        let sound = parse(&["--stop-acceleration", "2.5"]).expect("sound");
+        assert_eq!(sound.timing().stop_acceleration, 2.5);
+        for wrong in ["0", "-1", "NaN", "inf", "fast"] {
+            assert!(parse(&[&format!("--stop-acceleration={wrong}")]).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -152,9 +152,11 @@ impl Door {
         log(self.goals.send_goal_response(asker, answer).is_ok(), "a goal's answer");
     }
 
-    /// Tells which goals are being cancelled; `ended`: one that was meant has ended before.
-    pub fn answer_cancel(&self, asker: RmwRequestId, canceling: &[GoalId], ended: bool) {
+    /// Tells which goals are being cancelled; `all`: none was named, `ended`: the one that was has
+    /// ended before.
+    pub fn answer_cancel(&self, asker: RmwRequestId, all: bool, canceling: &[GoalId], ended: bool) {
         let return_code = match (canceling, ended) {
+            _ if all => CancelResponse::NONE,
             ([], true) => CancelResponse::GOAL_TERMINATED,
             ([], false) => CancelResponse::UNKNOWN_GOAL,
             _ => CancelResponse::NONE,

@@ -43,7 +43,7 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     );
     let mut endpoint = Endpoint::open(&ipc, &arm, ear, &args.timing(), args.takeover())
         .context("an endpoint runs already")?;
-    let mut player = Player::default();
+    let mut player = Player::new(args.period() * 1_000_000);
     let (mut told, mut due_ns) = (Told::default(), now_ns());
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);

@@ -48,6 +48,8 @@ pub struct Link {
     running: Option<Subscription<Bool>>,
     state: Option<Subscription<ControllerState>>,
     power: Option<Client<SetBoolRequest, SetBoolResponse>>,
+    /// What the motors were last asked to be.
+    wanted: Option<bool>,
     known: Known,
     looked: Instant,
     /// When the controller last told its state. \[ns\]
@@ -116,6 +118,7 @@ impl Link {
             running,
             state,
             power,
+            wanted: None,
             known,
             looked,
             active_ns: 0,
@@ -145,6 +148,10 @@ impl Link {
             while let Ok(Some((_, answer))) = client.receive_response() {
                 if answer.success {
                     tracing::info!("the robot's power service: done {}", answer.message);
+                    // Where no topic tells it, that is what is known.
+                    if self.running.is_none() && self.wanted == Some(false) {
+                        self.known.running = Some(false);
+                    }
                 } else {
                     tracing::error!("the robot's power service refused: {}", answer.message);
                 }
@@ -182,9 +189,17 @@ impl Link {
     }
 
     /// Asks for the motors on or off. Whether that was done is logged.
-    pub fn power(&self, on: bool) {
+    pub fn power(&mut self, on: bool) {
         let word = if on { "on" } else { "off" };
+        let again = self.wanted.replace(on) == Some(on);
+        if on && self.running.is_none() {
+            self.known.running = Some(true);
+        }
+        if again && self.power.is_some() {
+            tracing::error!("the motors are not {word} yet: the power service is asked again");
+        }
         match &self.power {
+            None if again => {}
             None => tracing::warn!(
                 "the executor wants the motors {word}, but no service does that here (--power): the \
                  arm holds, its controller's motors as they are"

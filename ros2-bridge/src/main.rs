@@ -4,6 +4,7 @@
 //! behind it.
 
 mod args;
+mod brake;
 mod domain;
 mod door;
 mod endpoint;

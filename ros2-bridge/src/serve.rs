@@ -23,6 +23,7 @@ use ros2_client::service::RmwRequestId;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::args::{Common, ServeArgs};
+use crate::brake::{Answer, Brake};
 use crate::door::{Door, Wanted};
 use crate::goals::{Goals, Status};
 use crate::messages::{FollowResult, JointTrajectory};
@@ -31,8 +32,14 @@ use crate::messages::{FollowResult, JointTrajectory};
 const ROUND: Duration = Duration::from_millis(1);
 /// An executor that has not said a word for so long is gone. \[ns\]
 const SILENT_NS: u64 = 500_000_000;
-/// How long a stop, an admission or a command's answer is waited for.
+/// How long an admission is waited for; twice that, that the arm comes to hold.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// A goal that begins later than this is refused: the clocks disagree. \[ns\]
+const FARTHEST_NS: u64 = 60_000_000_000;
+/// What begins so little late begins at its own time 0. \[ns\]
+const AT_ONCE_NS: u64 = 20_000_000;
+/// How long it is waited at the end that the arm has stopped.
+const LAST: Duration = Duration::from_secs(3);
 
 /// What is to be followed next.
 struct Wish {
@@ -41,7 +48,15 @@ struct Wish {
     points: Vec<Waypoint>,
     /// When it is to begin. \[ns\]
     begins_ns: u64,
+    /// From when on it waits: it came, and is to begin.
     since: Instant,
+}
+
+impl Wish {
+    /// Whether its time has come.
+    fn is_due(&self) -> bool {
+        now_ns() >= self.begins_ns
+    }
 }
 
 /// What the executor has.
@@ -51,7 +66,10 @@ struct Running {
     /// Who is to be told whether it was accepted.
     asker: Option<RmwRequestId>,
     since: Instant,
-    accepted: bool,
+    /// When it was accepted, by the executor's stamp. \[ns\]
+    accepted_ns: Option<u64>,
+    /// Whether its goal is to be cancelled as soon as there is one.
+    cancelled: bool,
 }
 
 /// Runs until SIGINT or SIGTERM.
@@ -66,12 +84,13 @@ pub fn run(common: &Common, args: &ServeArgs) -> anyhow::Result<()> {
     let mut door = Door::open(common, &args.controller, args.publish_joint_states, names)?;
     let mut server = Server::open(args, &arm)?;
     tracing::info!("robot {}: goals on {}", args.robot_name, door.action());
-    while !done.load(Ordering::Relaxed) {
+    let mut sound = Ok(());
+    while sound.is_ok() && !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
-        server.round(&mut door)?;
+        sound = server.round(&mut door);
     }
     server.close(&mut door);
-    Ok(())
+    sound
 }
 
 struct Server {
@@ -89,8 +108,10 @@ struct Server {
     /// When the last one ended: what was told before says nothing. \[ns\]
     ended_ns: u64,
     newest: Option<Telemetry>,
-    /// When the running plan was last asked to stop, and the question.
-    stopping: Option<(Instant, Asked)>,
+    /// What is to be stopped.
+    brake: Brake<Asked>,
+    /// When it was last told that a stop cannot be asked for.
+    told: Option<Instant>,
 }
 
 impl Server {
@@ -120,23 +141,13 @@ impl Server {
             last: PlanId::NONE,
             ended_ns: 0,
             newest: None,
-            stopping: None,
+            brake: Brake::default(),
+            told: None,
         })
     }
 
     fn round(&mut self, door: &mut Door) -> anyhow::Result<()> {
-        while let Some(telemetry) = self.telemetry.receive()? {
-            door.show(&telemetry);
-            self.newest = Some(telemetry);
-        }
-        while let Some(event) = self.events.receive()? {
-            self.event(&event, door);
-        }
-        let answer = self.stopping.as_ref().and_then(|(_, asked)| asked.answer().ok().flatten());
-        if answer.is_some_and(|answer| answer.verdict == Verdict::Busy.wire()) {
-            self.stopping = None;
-            self.stop();
-        }
+        self.hear(door)?;
         for wanted in door.wanted() {
             match wanted {
                 Wanted::Goal { asker, id, trajectory } => {
@@ -158,22 +169,50 @@ impl Server {
             }
         }
         self.lose(door);
+        // One that is to begin later leaves what runs until then.
+        if self.wish.as_ref().is_some_and(Wish::is_due) {
+            self.stop();
+        }
+        self.brake();
         self.begin(door);
         door.tell(&self.goals, self.running.as_ref().and_then(|r| r.goal), self.newest.as_ref());
         Ok(())
     }
 
+    /// Takes in what the executor tells.
+    fn hear(&mut self, door: &mut Door) -> anyhow::Result<()> {
+        while let Some(telemetry) = self.telemetry.receive()? {
+            door.show(&telemetry);
+            self.newest = Some(telemetry);
+        }
+        while let Some(event) = self.events.receive()? {
+            self.event(&event, door);
+        }
+        Ok(())
+    }
+
     /// What the executor did with a plan.
     fn event(&mut self, event: &PlanEvent, door: &mut Door) {
-        let Some(running) = self.running.as_mut().filter(|r| r.plan == event.plan) else { return };
         let Some(kind) = EventKind::from_wire(event.kind) else { return };
+        if self.brake.wants(event.plan) {
+            self.ended_ns = event.stamp_ns;
+            match kind {
+                EventKind::Accepted => self.brake.accepted(event.plan, event.stamp_ns),
+                EventKind::Started => {}
+                _ => self.brake.over(event.plan),
+            }
+        }
+        let Some(running) = self.running.as_mut().filter(|r| r.plan == event.plan) else { return };
         self.ended_ns = event.stamp_ns;
         let reason = Reason::from_wire(event.reason).unwrap_or(Reason::None);
         match kind {
             EventKind::Accepted => {
-                running.accepted = true;
+                running.accepted_ns = Some(event.stamp_ns);
                 if let (Some(id), Some(asker)) = (running.goal, running.asker.take()) {
                     self.goals.accept(id, Instant::now());
+                    if running.cancelled {
+                        self.goals.cancel(id);
+                    }
                     door.answer_goal(asker, true);
                 }
             }
@@ -207,7 +246,6 @@ impl Server {
     /// The running plan has ended.
     fn end(&mut self, status: Status, code: i32, why: &str, door: &mut Door) {
         let Some(running) = self.running.take() else { return };
-        self.stopping = None;
         let Some(id) = running.goal else { return };
         if let Some(asker) = running.asker {
             door.answer_goal(asker, false);
@@ -241,11 +279,9 @@ impl Server {
         let Some(now) = self.fresh() else {
             return refuse("no executor is there, or it is silent", door);
         };
-        if self.running.is_none() && now.plan.is_some() && now.plan != self.last {
+        let ours = now.plan == self.last || self.brake.wants(now.plan);
+        if self.running.is_none() && now.plan.is_some() && !ours {
             return refuse("the executor has a plan of somebody else's", door);
-        }
-        if let Some((asker, _)) = self.wish.take().and_then(|old| old.goal) {
-            door.answer_goal(asker, false);
         }
         let stamp = trajectory.header.stamp;
         let stamp_ns = if stamp.sec == 0 && stamp.nanosec == 0 {
@@ -253,20 +289,50 @@ impl Server {
         } else {
             moment(stamp.sec, stamp.nanosec)
         };
-        self.wish = Some(Wish { goal, points, begins_ns: stamp_ns, since: Instant::now() });
-        self.stop();
+        let ahead_ns = stamp_ns.saturating_sub(now_ns());
+        if ahead_ns > FARTHEST_NS {
+            let why = format!(
+                "its stamp is {:.0} s ahead: set both machines' clocks by NTP",
+                ahead_ns as f64 * 1e-9
+            );
+            return refuse(&why, door);
+        }
+        if let Some((asker, _)) = self.wish.take().and_then(|old| old.goal) {
+            door.answer_goal(asker, false);
+        }
+        let since = Instant::now() + Duration::from_nanos(ahead_ns);
+        self.wish = Some(Wish { goal, points, begins_ns: stamp_ns, since });
     }
 
-    /// Has the arm stop on the path of what runs.
+    /// Has the arm stop on the path of what runs, or is about to.
     fn stop(&mut self) {
-        if self.running.as_ref().is_some_and(|r| r.accepted) && self.stopping.is_none() {
-            match self.commands.ask(CommandKind::Stop, 0.0) {
-                Ok(asked) => self.stopping = Some((Instant::now(), asked)),
-                Err(error) => tracing::error!("the executor cannot be asked to stop: {error}"),
-            }
+        if let Some(running) = &self.running {
+            self.brake.want(running.plan, running.accepted_ns, Instant::now());
         }
     }
 
+    /// Asks the executor to stop what is to be stopped.
+    fn brake(&mut self) {
+        let tells = self.fresh().map(|t| (t.plan, t.stamp_ns));
+        let (commands, told) = (&self.commands, &mut self.told);
+        let ask = || match commands.ask(CommandKind::Stop, 0.0) {
+            Ok(asked) => Some(asked),
+            Err(error) => {
+                if told.is_none_or(|at| at.elapsed() > PATIENCE) {
+                    *told = Some(Instant::now());
+                    tracing::error!("the executor cannot be asked to stop, tried again: {error}");
+                }
+                None
+            }
+        };
+        self.brake.round(tells, Instant::now(), ask, |asked| match asked.answer() {
+            Ok(None) => Answer::None,
+            Ok(Some(answer)) if answer.verdict == Verdict::Accepted.wire() => Answer::Taken,
+            Ok(Some(_)) | Err(_) => Answer::Busy,
+        });
+    }
+
+    /// Ends one goal, or all: also what is not accepted yet, and what came on the topic.
     fn cancel(&mut self, asker: RmwRequestId, id: Option<GoalId>, door: &mut Door) {
         let meant: Vec<GoalId> = id.map_or_else(|| self.goals.open().collect(), |id| vec![id]);
         let mut canceling = Vec::new();
@@ -278,31 +344,34 @@ impl Server {
                 None => {}
             }
         }
-        door.answer_cancel(asker, &canceling, ended);
-        if self.running.as_ref().is_some_and(|r| r.goal.is_some_and(|g| canceling.contains(&g))) {
+        let is_meant =
+            |goal: Option<GoalId>| id.is_none_or(|id| goal.is_some_and(|goal| goal == id));
+        if self.wish.as_ref().is_some_and(|w| is_meant(w.goal.map(|(_, id)| id))) {
+            self.refuse_wish("it was cancelled", door);
+        }
+        if let Some(running) = self.running.as_mut().filter(|r| is_meant(r.goal)) {
+            running.cancelled = true;
             self.stop();
         }
+        door.answer_cancel(asker, id.is_none(), &canceling, ended);
     }
 
     /// What cannot come any more.
     fn lose(&mut self, door: &mut Door) {
         if self.fresh().is_none() && self.running.is_some() {
-            tracing::error!("the executor is silent: its goal ends");
+            tracing::error!("the executor is silent: its goal ends, and its plan if it goes on");
+            self.stop();
             self.end(Status::Aborted, FollowResult::INVALID_GOAL, "the executor was lost", door);
         }
-        let unheard = |r: &Running| !r.accepted && r.since.elapsed() > PATIENCE;
+        let unheard = |r: &Running| r.accepted_ns.is_none() && r.since.elapsed() > PATIENCE;
         if self.running.as_ref().is_some_and(unheard) {
+            self.stop();
             self.end(
                 Status::Aborted,
                 FollowResult::INVALID_GOAL,
                 "the executor says nothing",
                 door,
             );
-        }
-        // A stop that was lost is asked for again.
-        if self.stopping.as_ref().is_some_and(|(at, _)| at.elapsed() > PATIENCE) {
-            self.stopping = None;
-            self.stop();
         }
         if let Some(wish) = self.wish.take_if(|w| w.since.elapsed() > 2 * PATIENCE) {
             tracing::warn!("a goal is refused: the arm did not come to hold");
@@ -316,7 +385,11 @@ impl Server {
     fn begin(&mut self, door: &mut Door) {
         let Some(now) = self.fresh().copied() else { return };
         let known = now.stamp_ns > self.ended_ns && now.plan == PlanId::NONE;
-        if self.running.is_some() || !known || now.mode != Mode::Hold.wire() {
+        if !self.wish.as_ref().is_some_and(Wish::is_due) {
+            return;
+        }
+        let open = self.running.is_some() || self.brake.is_open(Instant::now());
+        if open || !known || now.mode != Mode::Hold.wire() {
             if self.running.is_none() && now.mode == Mode::Fault.wire() {
                 self.refuse_wish("the executor is in a fault", door);
             }
@@ -326,9 +399,7 @@ impl Server {
         let holds =
             JointVector::from_fn(|j| if j < self.guard.dof { now.commanded[j] } else { 0.0 });
         let passed_ns = now_ns().saturating_sub(wish.begins_ns);
-        // What is new begins at its own time 0, as it came while nothing ran.
-        let at_once = wish.since.elapsed() < Duration::from_millis(20) && passed_ns < 20_000_000;
-        let passed_ns = if at_once { 0 } else { passed_ns };
+        let passed_ns = if passed_ns < AT_ONCE_NS { 0 } else { passed_ns };
         let made = front(&wish.points, passed_ns, &holds, &self.guard);
         let made = match made {
             Ok(made) => made,
@@ -348,7 +419,8 @@ impl Server {
                 self.last = plan;
                 let (asker, goal) = wish.goal.unzip();
                 let since = Instant::now();
-                self.running = Some(Running { plan, goal, asker, since, accepted: false });
+                self.running =
+                    Some(Running { plan, goal, asker, since, accepted_ns: None, cancelled: false });
             }
             Err(why) => {
                 self.wish = Some(wish);
@@ -370,10 +442,26 @@ impl Server {
         self.newest.as_ref().filter(|t| now_ns().saturating_sub(t.stamp_ns) < SILENT_NS)
     }
 
-    /// Ends what runs: nobody would hear of it.
+    /// Ends what runs: nobody would hear of it. Waits until the arm has stopped, for a while.
     fn close(&mut self, door: &mut Door) {
         self.refuse_wish("ros2-bridge ends", door);
         self.stop();
+        let began = Instant::now();
+        while self.running.is_some() && began.elapsed() < LAST {
+            std::thread::sleep(ROUND);
+            if self.hear(door).is_err() {
+                // The stop may be asked for all the same.
+                tracing::error!("the executor cannot be heard");
+                std::thread::sleep(ROUND * 20);
+            }
+            self.brake();
+        }
+        if let Some(running) = &self.running {
+            tracing::error!(
+                "plan {} may go on, the executor has not said that it stopped: `executor ctl stop`",
+                running.plan
+            );
+        }
         self.end(Status::Aborted, FollowResult::INVALID_GOAL, "ros2-bridge ended", door);
         std::thread::sleep(Duration::from_millis(100));
     }

@@ -70,3 +70,6 @@ FAULTS = {
     "the executor dies": (
         lambda s: s.executor_process.kill(), "setpoints have ceased", None, None, []),
 }
+
+# A controller of bare positions tells no state, and stops at once when nothing comes any more.
+BY_TRAJECTORY = ["the controller is switched off", "the bridge dies"]

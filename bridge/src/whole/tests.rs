@@ -110,3 +110,46 @@ fn a_plan_that_begins_at_speed_needs_one_that_brings_it_there() {
     let after = plan(5, Some(1), &moving, |_| {});
     assert_eq!(judge(&after, None, 0.0), Err(Reason::JoinPlan));
 }
+
+fn given(plan: ValidPlan, start_ns: u64) -> Running {
+    let goal = String::new();
+    Running { plan, goal, start_ns, started: true, ended_ns: None, there_ns: None }
+}
+
+/// A controller's word is no measurement: a plan is finished once the arm has been at its end for a
+/// while, and not at all where it does not come there.
+#[test]
+fn a_plan_is_finished_where_the_arm_is_measured() {
+    let guard = guard();
+    let mut running = given(running(), NOW);
+    let end = home(0.2);
+    let mut at = |by: f64, ms: u64, said: bool| {
+        running.ended_ns = said.then_some(NOW + 4000 * MS);
+        let measured = JointVector::from_fn(|j| end[j] + if j == 0 { by } else { 0.0 });
+        running.judge(Some(&measured), &guard, NOW + ms * MS).map(|why| (why.reason, why.joint))
+    };
+    // There, and the controller is not done; said, and still on its way.
+    assert_eq!(at(0.0, 3990, false), None);
+    assert_eq!(at(0.05, 4000, true), None);
+    assert_eq!(at(0.01, 4200, true), None);
+    assert_eq!(at(0.03, 4230, true), None);
+    assert_eq!(at(0.01, 4300, true), None);
+    assert_eq!(at(0.01, 4349, true), None);
+    assert_eq!(at(0.01, 4350, true), Some((Reason::None, u32::MAX)));
+    assert_eq!(at(0.03, 4999, true), None);
+    assert_eq!(at(0.03, 5000, true), Some((Reason::Goal, 0)));
+    assert_eq!(at(f64::NAN, 5000, true), Some((Reason::Goal, 0)));
+    assert!(running.judge(None, &guard, NOW + 4000 * MS).is_some());
+}
+
+/// Until the splice the arm moves on the old plan.
+#[test]
+fn what_the_arm_is_on_is_told_until_the_splice() {
+    let (old, new) = (
+        given(running(), NOW),
+        given(plan(2, None, &[(0, 0.1, 0.0), (900, 0.1, 0.0)], |_| {}), NOW + 2000 * MS),
+    );
+    let on = |before, ms| moving(Some(&new), before, NOW + ms * MS).map(|r| r.plan.id().number);
+    assert_eq!([1999, 2000].map(|ms| on(Some(&old), ms)), [Some(1), Some(2)]);
+    assert_eq!([1999, 2000].map(|ms| on(None, ms)), [None, Some(2)]);
+}

@@ -19,6 +19,7 @@ use crate::total::{greater, within};
 use crate::{JointVector, MAX_DOF};
 use motion::{check_corners, check_end, check_jerk, check_segments};
 
+pub(crate) use motion::passed;
 pub(crate) use plan::Shape;
 pub use plan::{Join, ValidPlan};
 pub use rejection::Rejection;

@@ -72,28 +72,33 @@ pub(super) fn check_jerk(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejectio
     if limited.is_empty() || plan.interpolation() == Interpolation::Linear {
         return Ok(());
     }
-    let (cycle, times) = (guard.period_ns as f64, plan.times());
     // Straight in time between knots: a change over a cycle is greatest where the cycle begins or
     // ends in a knot, just before it or just after.
-    for (knot, &time) in times.iter().enumerate() {
-        for begin in [time - cycle, time] {
-            for just_after in [false, true] {
-                let [from, to] = [begin, begin + cycle].map(|at| segment(times, at, just_after));
-                for &j in &limited {
-                    let from = acceleration_in(plan, from, begin, j);
-                    let to = acceleration_in(plan, to, begin + cycle, j);
-                    guard.allows_step(j, from, to).map_err(|(shown, most)| {
-                        Rejection::new(Reason::Jerk).knot(knot).joint(j).value(shown, most)
-                    })?;
-                }
-            }
+    for (knot, ends) in windows(plan.times(), guard.period_ns as f64) {
+        for &j in &limited {
+            let [from, to] = ends.map(|(passed, time)| acceleration_in(plan, passed, time, j));
+            guard.allows_step(j, from, to).map_err(|(shown, most)| {
+                Rejection::new(Reason::Jerk).knot(knot).joint(j).value(shown, most)
+            })?;
         }
     }
     Ok(())
 }
 
+/// All spans of time of that length that begin or end in a knot, just before it or just after: the
+/// knot, and for both ends how many knots are behind them, and when they are. \[ns\]
+fn windows(times: &[f64], length: f64) -> impl Iterator<Item = (usize, [(usize, f64); 2])> {
+    times.iter().enumerate().flat_map(move |(knot, &time)| {
+        [time - length, time].into_iter().flat_map(move |begin| {
+            [false, true].map(|just_after| {
+                (knot, [begin, begin + length].map(|at| (passed(times, at, just_after), at)))
+            })
+        })
+    })
+}
+
 /// How many knots are behind a moment: those at that very moment too, where it is `just_after` them.
-fn segment(times: &[f64], at: f64, just_after: bool) -> usize {
+pub(crate) fn passed(times: &[f64], at: f64, just_after: bool) -> usize {
     times.partition_point(|&t| t < at || just_after && t == at)
 }
 
@@ -122,22 +127,37 @@ pub(super) fn check_end(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection
 }
 
 /// Straight segments without leave for corners: the velocity steps nowhere by more than each joint
-/// may change it in a cycle. At both ends the arm holds, but for a plan that joins another one:
-/// that its first velocity is the one there is judged when it does.
+/// may change it in a cycle, and changes in no cycle by more, however close the knots are. At both
+/// ends the arm holds, but for a plan that joins another one: that its first velocity is the one
+/// there is judged when it does.
 pub(super) fn check_corners(plan: &ValidPlan, guard: &Guard) -> Result<(), Rejection> {
     if plan.has_corners() || plan.interpolation() == Interpolation::Cubic {
         return Ok(());
     }
-    let along =
-        plan.knots.windows(2).map(|k| sample(&k[0], &k[1], plan.interpolation(), k[1].time).v);
-    let mut before = None;
-    for (knot, after) in along.chain([JointVector::ZERO]).enumerate() {
-        if let Some(before) = before.replace(after) {
-            guard.matches_velocity(&before, &after).map_err(|(joint, step)| {
-                let bound = guard.velocity_tolerance(joint);
-                Rejection::new(Reason::Corner).knot(knot).joint(joint).value(step, bound)
-            })?;
-        }
+    let corner = |knot: usize, before: &JointVector, after: &JointVector| {
+        guard.matches_velocity(before, after).map_err(|(joint, step)| {
+            let bound = guard.velocity_tolerance(joint);
+            Rejection::new(Reason::Corner).knot(knot).joint(joint).value(step, bound)
+        })
+    };
+    // By how many knots are behind.
+    let joins = matches!(plan.join(), Join::Knot { .. });
+    let along: Vec<JointVector> = plan
+        .knots
+        .windows(2)
+        .map(|k| sample(&k[0], &k[1], plan.interpolation(), k[1].time).v)
+        .collect();
+    let first = along.first().copied().filter(|_| joins).unwrap_or(JointVector::ZERO);
+    let along: Vec<JointVector> =
+        [first].into_iter().chain(along).chain([JointVector::ZERO]).collect();
+    for (knot, pair) in along.windows(2).enumerate().skip(1) {
+        corner(knot, &pair[0], &pair[1])?;
+    }
+    // How it begins is judged then.
+    let cycle = guard.period_ns as f64 - ROUNDING_S * 1e9;
+    for (knot, ends) in windows(plan.times(), cycle).filter(|&(knot, _)| knot > 0) {
+        let [before, after] = ends.map(|(passed, _)| &along[passed]);
+        corner(knot, before, after)?;
     }
     Ok(())
 }

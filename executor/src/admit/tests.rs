@@ -264,6 +264,41 @@ fn a_polyline_without_corners_needs_no_leave_for_them() {
     assert_eq!(line(1.5).unwrap_err().reason, Reason::Corner);
 }
 
+/// Knots closer than a cycle do not hide a step: what setpoints show is the sum.
+#[test]
+fn corners_are_summed_over_a_cycle() {
+    let guard = pr2();
+    let step = guard.velocity_tolerance(0);
+    // Speeds up and slows down by `share` of the tolerance in each knot.
+    let line = |share: f64, apart_ns: u64, count: u64| {
+        let (mut q, mut points) = (HOME, vec![(0, HOME)]);
+        for k in 0..count {
+            q[0] += share * step * k.min(count - 1 - k) as f64 * apart_ns as f64 * 1e-9;
+            points.push(((k + 1) * apart_ns, q));
+        }
+        let (mut header, knots) = message(1, &points);
+        header.corners = 0;
+        seal(&mut header, &knots);
+        judge(&header, &knots, Some(&held()))
+    };
+    // From rest to 1.6 rad/s within one cycle, and back.
+    assert_eq!(line(0.99, MS / 1000, 800).unwrap_err().reason, Reason::Corner);
+    for (share, apart_ns, fits) in [
+        (0.99, MS, true),
+        // As a planner may round it.
+        (0.99, MS - 1, true),
+        (0.99, MS - 2, false),
+        (0.49, MS / 2, true),
+        (0.51, MS / 2, false),
+        (0.09, MS / 10, true),
+        (0.11, MS / 10, false),
+    ] {
+        let found = line(share, apart_ns, 100).map(|_| ()).map_err(|why| why.reason);
+        let expected = if fits { Ok(()) } else { Err(Reason::Corner) };
+        assert_eq!(found, expected, "{share} in {apart_ns} ns");
+    }
+}
+
 /// Whatever stands for a number: refused, or every figure of the plan is a bounded one.
 #[test]
 fn no_number_passes_a_bound_that_it_does_not_keep() {

@@ -10,8 +10,6 @@ use crate::hardware::Loopback;
 use crate::slots::{ServiceEnd, Slots, WorkerEnd};
 use crate::testing::{HOME, MS, moved, plan};
 
-/// A held joint that moves while a plan runs stops the arm on its path; a whole turn, a small
-/// drift, or a move at rest does not.
 /// An arm that stands at home.
 fn at_home() -> JointStates {
     let mut states = JointStates {
@@ -24,6 +22,8 @@ fn at_home() -> JointStates {
     states
 }
 
+/// A held joint that moves while a plan runs stops the arm on its path; a whole turn, a small
+/// drift, or a move at rest does not.
 #[test]
 fn a_moving_torso_stops_the_arm() {
     for (by, stops) in [(0.015, false), (TAU, false), (0.05, true), (f64::NAN, true)] {

@@ -40,7 +40,7 @@ pub fn parse<P: Parser>(
     };
     let cell = match Cell::read(&path) {
         Ok(cell) => cell,
-        Err(why) if args.get(1).is_some_and(|arg| urgent.iter().any(|name| arg == name)) => {
+        Err(why) if is_urgent(&args, urgent) => {
             say(&format!("warning: {why}; what it says is not heeded"));
             Cell::default()
         }
@@ -56,6 +56,20 @@ pub fn parse<P: Parser>(
         say(&format!("note: what is not given is taken from {}", path.display()));
     }
     P::from_arg_matches_mut(&mut matches)
+}
+
+/// Whether the subcommand is one of those: the first word that is no flag, nor the value of one that
+/// takes it apart.
+fn is_urgent(args: &[OsString], urgent: &[&str]) -> bool {
+    let mut rest = args.iter().skip(1);
+    while let Some(arg) = rest.next() {
+        if arg == "--cell" {
+            rest.next();
+        } else if !arg.as_encoded_bytes().starts_with(b"-") {
+            return urgent.iter().any(|name| arg == name);
+        }
+    }
+    false
 }
 
 /// Says something on standard error; nobody need hear it.
@@ -164,6 +178,29 @@ mod tests {
         let cell = ["--cell", path.to_str().expect("UTF-8")];
         parse::<Cli>([&["x"], args, &cell].concat(), &[("replan", &["base"])], &[])
             .map(|c| c.command)
+    }
+
+    /// Stopping an arm is kept from nothing, wherever the cell's name stands.
+    #[test]
+    fn a_broken_cell_keeps_no_urgent_command() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let broken = folder.path().join("broken.toml");
+        std::fs::write(&broken, "arm = [").expect("written");
+        let path = broken.to_str().expect("UTF-8");
+        let one = format!("--cell={path}");
+        let judge = |args: &[&str]| parse::<Cli>(args, &[], &["replan"]).map(|c| c.command);
+        for args in [
+            &["x", "replan", "--cell", path][..],
+            &["x", "--cell", path, "replan"],
+            &["x", &one, "replan"],
+        ] {
+            assert!(matches!(judge(args), Ok(Sub::Replan { base: None })), "{args:?}");
+        }
+        for args in
+            [&["x", "--cell", path, "plan"][..], &["x", "plan", "--posture", "replan", &one]]
+        {
+            assert_eq!(judge(args).unwrap_err().kind(), ErrorKind::ValueValidation, "{args:?}");
+        }
     }
 
     #[test]

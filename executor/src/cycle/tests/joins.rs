@@ -3,7 +3,8 @@
 
 use super::*;
 use crate::Guard;
-use crate::admit::ValidPlan;
+use crate::admit::{Rejection, ValidPlan, admit};
+use crate::testing::{held, message, rules, seal};
 
 /// Joint 0 out and back in a sine, within 4 rad/s²: knots each 50 ms, moving at most.
 fn sine(guard: &Guard, number: u64) -> std::sync::Arc<ValidPlan> {
@@ -236,6 +237,139 @@ fn a_join_makes_no_step_of_the_acceleration_beyond_a_jerk_limit() {
     let mut sim = Sim::holding(pr2());
     only(&sim.offer(gentle(&pr2())), Accepted);
     only(&sim.offer(curve(2, &even)), Accepted);
+}
+
+/// Joint 0 from `from` at a speed and an acceleration, by jerks of so many seconds each.
+fn jerks(
+    guard: &Guard,
+    number: u64,
+    from: JointVector,
+    (mut speed, mut acceleration): (f64, f64),
+    parts: &[(f64, f64)],
+    edit: impl FnOnce(&mut nullsweep_ipc_types::PlanHeader),
+) -> Result<std::sync::Arc<ValidPlan>, Rejection> {
+    let (mut time, mut way) = (0, 0.0);
+    let (mut points, mut speeds) = (vec![(0, from)], vec![speed]);
+    for &(seconds, jerk) in parts {
+        let ns = (seconds * 1e9).round();
+        let t = ns * 1e-9;
+        way += speed * t + acceleration * t * t / 2.0 + jerk * t * t * t / 6.0;
+        speed += acceleration * t + jerk * t * t / 2.0;
+        acceleration += jerk * t;
+        time += ns as u64;
+        points.push((time, moved(from, 0, way)));
+        speeds.push(speed);
+    }
+    let (mut header, mut knots) = message(number, &points);
+    header.interpolation = Interpolation::Cubic.wire();
+    edit(&mut header);
+    knots.iter_mut().zip(speeds).for_each(|(k, v)| k.velocities[0] = v);
+    seal(&mut header, &knots);
+    admit(&header, &knots, Some(&held()), &rules(guard), u64::MAX).map(std::sync::Arc::new)
+}
+
+/// A step of the acceleration within the limit and a jerk on both sides of it add up in the cycle
+/// across the seam.
+#[test]
+fn jerk_is_summed_over_the_cycle_across_a_join() {
+    let mut guard = pr2();
+    guard.joints[0].limits.jerk = Some(3.3);
+    let first = gentle(&guard);
+    let at = first.knots()[1];
+    // There it speeds up at 0.8 rad/s², at 0.1 rad/s, with 3.2 rad/s³.
+    let join = |number, acceleration: f64, jerk: f64| {
+        let (rise, t) = (0.05, 0.8 / 3.2);
+        let top = acceleration + jerk * rise;
+        let speed = 0.1 + (acceleration + top) / 2.0 * rise + top * top / 6.4;
+        let half = (speed / 3.2).sqrt();
+        assert!(half > t);
+        let parts = [(rise, jerk), (top / 3.2, -3.2), (half, -3.2), (half, 3.2)];
+        jerks(&guard, number, at.q, (0.1, acceleration), &parts, |h| {
+            h.join_rule = JoinRule::AtKnot.wire();
+            (h.join_plan, h.join_knot) = (id(1), 1);
+        })
+        .expect("sound by itself")
+    };
+    let mut sim = Sim::holding(guard);
+    only(&sim.offer(first.clone()), Accepted);
+    let step = 0.99 * guard.sudden(0);
+    for (number, acceleration, jerk) in [(2, 0.8 + step, 3.2), (3, 0.8 + step, -3.2)] {
+        let why = only(&sim.offer(join(number, acceleration, jerk)), Rejected).why;
+        assert_eq!((why.reason, why.joint), (Reason::Jerk, 0), "{why}");
+        assert!((why.value - 3.2 - 0.99 * 3.3).abs() < 0.01 && why.bound > 3.29, "{why}");
+    }
+    only(&sim.offer(join(4, 0.8, 3.2)), Accepted);
+    sim.run_until(Mode::Hold, 3000);
+    assert_eq!(sim.story(4), [Accepted, Started, Finished]);
+}
+
+/// The connector slows down to the first knot, where a plan may begin with all the jerk that there
+/// may be: the setpoints show no more of it.
+#[test]
+fn jerk_is_within_its_limit_from_the_connector_into_the_plan() {
+    let mut guard = tireless();
+    guard.joints[0].limits.jerk = Some(50.0);
+    let quarter = 0.15;
+    let parts = [(quarter, 49.0), (quarter, -49.0), (quarter, -49.0), (quarter, 49.0)];
+    let from = moved(HOME, 0, 0.0012);
+    let plan = jerks(&guard, 1, from, (0.0, 0.0), &parts, |_| {}).expect("sound by itself");
+    let mut sim = Sim::holding(guard);
+    only(&sim.offer(plan), Accepted);
+    let (mut speeds, mut shown) = (vec![0.0; 3], 0.0f64);
+    while sim.mode() != Mode::Hold {
+        sim.run(1);
+        speeds.push(sim.last_v[0]);
+        let [.., a, b, c] = speeds[..] else { panic!("three") };
+        shown = shown.max((a - 2.0 * b + c).abs() / guard.period().powi(2));
+    }
+    assert!(sim.story(1).contains(&Finished) && speeds.len() > 400, "{}", speeds.len());
+    assert!(shown <= 50.0 * (1.0 + 1e-6), "{shown} rad/s³");
+}
+
+/// Straight plans too: a corner on both sides of the seam, each as large as it may be.
+#[test]
+fn corners_are_summed_over_the_cycle_across_a_join() {
+    let guard = pr2();
+    let step = 0.9 * guard.velocity_tolerance(0);
+    // Speeds up by a step each `apart_ns` up to knot 20, and down again.
+    let stairs = |number, from: JointVector, first: u64, last_ns: u64, join: bool| {
+        let (mut q, mut points, mut time) = (from, vec![(0, from)], 0);
+        for k in first..60 {
+            let apart_ns = if k == first { last_ns } else { MS };
+            q[0] += step * k.min(59 - k) as f64 * apart_ns as f64 * 1e-9;
+            time += apart_ns;
+            points.push((time, q));
+        }
+        plan_with(&guard, number, &points, |h, _| {
+            h.corners = 0;
+            if join {
+                h.join_rule = JoinRule::AtKnot.wire();
+                (h.join_plan, h.join_knot) = (id(1), 20);
+            }
+        })
+    };
+    let first = stairs(1, HOME, 0, MS, false);
+    let at = first.knots()[20].q;
+    let mut sim = Sim::holding(guard);
+    only(&sim.offer(first), Accepted);
+    // In the seam, and half a cycle after it.
+    let why = only(&sim.offer(stairs(2, at, 20, MS / 2, true)), Rejected).why;
+    assert_eq!((why.reason, why.joint), (Reason::Start, 0), "{why}");
+    // So many knots there that the loop would be long in summing them.
+    let mut crowd = vec![(0, at)];
+    crowd.extend((1..=12).map(|k| (k * MS / 20, moved(at, 0, 20.0 * step * 5e-5 * k as f64))));
+    let mut q = crowd[12].1;
+    for k in (0..20).rev() {
+        q[0] += step * f64::from(k) * 1e-3;
+        crowd.push((crowd[crowd.len() - 1].0 + MS, q));
+    }
+    let crowd = plan_with(&guard, 4, &crowd, |h, _| {
+        (h.corners, h.join_rule) = (0, JoinRule::AtKnot.wire());
+        (h.join_plan, h.join_knot) = (id(1), 20);
+    });
+    let why = only(&sim.offer(crowd), Rejected).why;
+    assert_eq!((why.reason, why.bound), (Reason::Malformed, 8.0), "{why}");
+    only(&sim.offer(stairs(3, at, 20, MS, true)), Accepted);
 }
 
 /// While a plan is executed that its sender does not call verified, everybody is told.
