@@ -59,7 +59,7 @@ fn way(from: JointVector, to: JointVector, profile: Profile) -> Result<Plan, Tra
 /// Whether two joint vectors are the same posture.
 fn same(a: &JointVector, b: &JointVector) -> bool {
     let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
-    arm.continuous().displacement(a, b).iter().all(|apart| *apart < 1e-9)
+    arm.continuous().displacement(a, b).iter().all(|apart| apart.abs() < 1e-9)
 }
 
 /// Height of the pad over where the plan last touched the surface. \[m\]

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::Parser;
+use clap::builder::ArgPredicate;
 use comfy_table::{Table, presets};
 use nullsweep_cell::causes;
 use nullsweep_executor::log::last_words;
@@ -39,6 +40,8 @@ const PERIOD_NS: u64 = 1_000_000;
 /// was no violation.
 #[derive(Debug, Parser)]
 #[command(name = "mock-hardware", version)]
+// Where a plan says how the arm stands, a cell does not.
+#[command(mut_arg("held", |held| held.default_value_if("plan", ArgPredicate::IsPresent, None)))]
 struct Args {
     #[command(flatten)]
     arm: ArmArgs,
@@ -47,7 +50,13 @@ struct Args {
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
     /// Where the joints stand at first, base to tip; without it, the arm's home, in rad
-    #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "Q1,Q2,…")]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        allow_negative_numbers = true,
+        value_name = "Q1,Q2,…",
+        default_value_if("plan", ArgPredicate::IsPresent, None)
+    )]
     initial: Vec<f64>,
     /// How true to a robot the arm is
     #[arg(long, value_enum, default_value_t)]
@@ -104,7 +113,7 @@ pub struct Outcome {
 
 /// Runs the mock with the arguments of a command line, program name first.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Args = match nullsweep_cell::parse(args, &[], &[]) {
+    let args: Args = match nullsweep_cell::parse(args, &[("", &["record", "priority"])], &[]) {
         Ok(args) => args,
         Err(error) => error.exit(),
     };

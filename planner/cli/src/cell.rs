@@ -26,7 +26,7 @@ pub(super) struct CellArgs {
 
 #[derive(Debug, Subcommand)]
 enum Deed {
-    /// Write a cell file with comments for a robot, and check it.
+    /// Write a cell file with comments for a robot, and check it. Takes nothing from another cell file.
     Init(InitArgs),
     /// Check a cell: meshes, how far the arm reaches, whether its postures are free of collision.
     Check(CheckArgs),

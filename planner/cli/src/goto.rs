@@ -13,6 +13,7 @@ use crate::bars::Bars;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::numbers::{Held, Place};
 use crate::output::writable;
+use crate::posture::is_known;
 use crate::posture_arg::PostureArg;
 use crate::robot::{RobotArgs, tool_file};
 use crate::send::{SendArgs, outlook, resting};
@@ -31,16 +32,16 @@ pub(super) struct GotoArgs {
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
     /// Where the robot stands in the floor frame, without a plan: x,y,yaw.
-    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, conflicts_with = "plan")]
     base: Option<Place>,
     /// Height of the PR2's torso joint, without a plan. [m]
-    #[arg(long, value_name = "M", value_parser = crate::numbers::finite)]
+    #[arg(long, value_name = "M", value_parser = crate::numbers::finite, conflicts_with = "plan")]
     torso: Option<f64>,
     /// Position of another held joint, without a plan: NAME=VALUE.
-    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true, conflicts_with = "plan")]
     held: Vec<Held>,
     /// The tool, a TOML file, without a plan; else a sponge of 0.10 × 0.07 m.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "plan")]
     tool: Option<PathBuf>,
     #[command(flatten)]
     robot: RobotArgs,
@@ -107,7 +108,7 @@ impl GotoArgs {
     /// The posture that is asked for, and the scans. With a plan the posture may be left out.
     fn asked(&self, planned: bool) -> anyhow::Result<(Option<PostureArg>, Vec<PathBuf>)> {
         let Some(first) = &self.target else { return Ok((None, Vec::new())) };
-        if planned && Path::new(first).exists() {
+        if planned && Path::new(first).is_file() && !is_known(&self.robot, first)? {
             let first = PathBuf::from(first);
             return Ok((None, std::iter::once(first).chain(self.scans.iter().cloned()).collect()));
         }
@@ -121,8 +122,7 @@ impl GotoArgs {
 
     /// Where the arguments have the robot stand.
     fn standing<'a>(&'a self, scans: &'a [PathBuf]) -> anyhow::Result<Way<'a>> {
-        let torso = self.torso.map(|height| ("torso_lift_joint".to_owned(), height));
-        let held = torso.into_iter().chain(self.held.iter().map(|h| (h.0.clone(), h.1))).collect();
+        let held = crate::numbers::held(&self.held, self.torso);
         let base = match self.base {
             Some(Place(base)) => base,
             None if scans.is_empty() && !self.way.has_demo() => [0.0; 3],

@@ -101,7 +101,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         exit::BROKEN_PIPE,
         Arc::new(AtomicBool::new(true)),
     );
-    let cli: Cli = match nullsweep_cell::parse(args, &[("replan", &PLACED)], &[]) {
+    let cli: Cli = match nullsweep_cell::parse(
+        args,
+        &[("replan", &PLACED), ("init", &nullsweep_cell::FLAGS)],
+        &[],
+    ) {
         Ok(cli) => cli,
         Err(e) => {
             let _ = e.print();

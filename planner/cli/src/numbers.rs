@@ -75,6 +75,13 @@ impl FromStr for Held {
     }
 }
 
+/// Positions of held joints as they were given, the last of a name holds: the PR2's torso by its own flag
+/// before what has its name.
+pub(super) fn held(held: &[Held], torso: Option<f64>) -> Vec<(String, f64)> {
+    let torso = torso.map(|height| ("torso_lift_joint".to_owned(), height));
+    held.iter().map(|h| (h.0.clone(), h.1)).chain(torso).collect()
+}
+
 /// A share for people.
 pub(super) fn percent(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use clap::Args;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use nullsweep_planner::progress::Progress;
@@ -12,7 +12,8 @@ use nullsweep_surface::{PlacedScan, Placement, RawScan, ReadOptions, scan};
 
 use crate::advice;
 use crate::bars::Bars;
-use crate::floor::Placed;
+use crate::exit::Usage;
+use crate::floor::{Placed, Source};
 use crate::numbers::{Numbers, finite, isometry, not_negative, positive};
 use crate::scene_file::SceneFile;
 use crate::views;
@@ -62,20 +63,23 @@ pub(super) fn read_scans(
     if let [path] = scans
         && path.extension().is_some_and(|extension| extension == "toml")
     {
-        let given = args.up.is_some() || !args.sensor_pose.is_empty() || args.scale != 1.0;
-        ensure!(
-            !given,
-            "{}: a scene file says how its scans stand: leave out --up, --sensor-pose and --scale",
-            path.display()
-        );
+        // Some of it may be a cell's, for scans that have no scene file.
+        if args.up.is_some() || !args.sensor_pose.is_empty() || args.scale != 1.0 {
+            bars.note(&format!(
+                "{} says how its scans stand: --up, --sensor-pose and --scale are not heeded",
+                path.display()
+            ));
+        }
         return SceneFile::read(path);
     }
-    ensure!(
-        args.sensor_pose.is_empty() || args.sensor_pose.len() == scans.len(),
-        "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
-        scans.len(),
-        args.sensor_pose.len()
-    );
+    if !args.sensor_pose.is_empty() && args.sensor_pose.len() != scans.len() {
+        return Err(Usage(format!(
+            "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
+            scans.len(),
+            args.sensor_pose.len()
+        ))
+        .into());
+    }
     let options = ReadOptions { scale: args.scale, seed, ..ReadOptions::default() };
     let mut files = Vec::with_capacity(scans.len());
     for path in scans {
@@ -91,7 +95,7 @@ pub(super) fn read_scans(
         // All files share the frame of the first one.
         shared = Some(together(args, &files, seed, gravity, bars)?);
     }
-    let (mut joined, mut poses) = (PlacedScan::default(), Vec::with_capacity(files.len()));
+    let (mut joined, mut sources) = (PlacedScan::default(), Vec::with_capacity(files.len()));
     for (i, (path, raw)) in files.into_iter().enumerate() {
         let placement = match shared {
             Some((pose, is_seen)) => {
@@ -119,9 +123,9 @@ pub(super) fn read_scans(
             }
         }
         joined.join(placed);
-        poses.push(pose);
+        sources.push(Source { file: path.clone(), scale: args.scale, pose });
     }
-    Ok(Placed { scan: joined, poses, seed: None })
+    Ok(Placed { scan: joined, sources, seed: None })
 }
 
 /// Tells that a file does not say where its sensor stood, though an argument speaks of it.

@@ -444,6 +444,5 @@ fn job(
 }
 
 fn held(args: &PlanArgs) -> Vec<(String, f64)> {
-    let torso = args.torso.map(|height| ("torso_lift_joint".to_owned(), height));
-    torso.into_iter().chain(args.held.iter().map(|h| (h.0.clone(), h.1))).collect()
+    crate::numbers::held(&args.held, args.torso)
 }

@@ -82,6 +82,12 @@ impl Joints {
     }
 }
 
+/// Whether a word is a posture that somebody has named.
+pub(super) fn is_known(robot: &RobotArgs, word: &str) -> anyhow::Result<bool> {
+    let word = word.to_lowercase();
+    Ok(["home", "measured"].contains(&&word[..]) || known(robot)?.iter().any(|(n, _)| *n == word))
+}
+
 /// Every posture with a name, in lower case: those given first, then the SRDF's.
 fn known(robot: &RobotArgs) -> anyhow::Result<Vec<(String, Joints)>> {
     let given = robot

@@ -9,7 +9,7 @@ use nullsweep_robot::Arm;
 
 use crate::bars::Bars;
 use crate::choices::JoinArg;
-use crate::exit::{OK, VIOLATIONS};
+use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::robot::RobotArgs;
 use crate::send::{SendArgs, outlook, resting};
 use crate::site::SiteArgs;
@@ -23,7 +23,7 @@ pub(super) struct PublishArgs {
     #[arg(requires = "goto")]
     scans: Vec<PathBuf>,
     /// Bring the arm to the plan's start first, free of collision, as `planner goto` does.
-    #[arg(long, conflicts_with = "join")]
+    #[arg(long)]
     goto: bool,
     /// How it joins what is going on; without it at its knot for a plan that continues another
     /// one, else after a stop.
@@ -53,6 +53,14 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     }
     let natural = if plan.continues.is_some() { Join::Knot } else { Join::Stop };
     let join = args.join.map_or(natural, Join::from);
+    if args.goto && join != Join::Stop {
+        return Err(Usage(
+            "with --goto the arm comes to rest at the plan's start, and a plan that goes on from a              knot of another one, or after it, joins it in motion: leave out --goto, or give --join \
+             stop to run it alone"
+                .into(),
+        )
+        .into());
+    }
     let site = args.site.site();
     let arm = args.arm_of(&plan);
     let first = match args.way_to(&plan) {

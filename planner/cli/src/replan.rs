@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::ensure;
 use clap::Args;
 use nullsweep_ipc_types::PlanEvent;
 use nullsweep_planner::link::publish::{Patience, describe};
@@ -11,7 +10,7 @@ use nullsweep_planner::link::replan::{Start, replan};
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
 
-use crate::exit::{OK, VIOLATIONS};
+use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::numbers::seconds;
 use crate::plan::{PlanArgs, make};
 use crate::site::SiteArgs;
@@ -38,11 +37,14 @@ pub(super) struct ReplanArgs {
 }
 
 pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
-    ensure!(
-        !args.plan.is_placed(),
-        "where the new plan begins and the robot stands is the running plan's: leave out \
-         --continue, --start, --base, --torso and --held"
-    );
+    if args.plan.is_placed() {
+        return Err(Usage(
+            "where the new plan begins and the robot stands is the running plan's: leave out \
+             --continue, --start, --base, --torso and --held"
+                .into(),
+        )
+        .into());
+    }
     let running = Plan::read(&args.running)?;
     let end = args.wait.then(|| Duration::from_secs_f64(10.0 * running.duration() + 600.0));
     let patience = Patience { admission: args.timeout, end };

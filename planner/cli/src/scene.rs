@@ -98,7 +98,9 @@ pub(super) fn scene(
         scene.unseen.clear();
         bars.note("space that no view has seen counts as free");
     }
-    if args.placed.support_height > 0.0 {
+    if demo.is_some() && args.placed.support_height > 0.0 {
+        bars.note("a simulated scene stands on the floor: there is no table under it");
+    } else if args.placed.support_height > 0.0 {
         scene.obstacles.push(table::under(
             &scene.surface,
             args.placed.support_height,

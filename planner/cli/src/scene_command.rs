@@ -23,7 +23,8 @@ pub(super) struct SceneCommandArgs {
     scans: Vec<PathBuf>,
     #[command(flatten)]
     placed: PlacedArgs,
-    /// Seed of every random choice: the same seed finds the same planes and objects.
+    /// Seed of every random choice: the same seed finds the same planes and objects. A scene file has
+    /// its own.
     #[arg(long, default_value_t = SEED)]
     seed: u64,
     /// Write where the scans stand, planes and objects as TOML to a file, which `planner plan` and
@@ -41,14 +42,15 @@ pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     let found = read_scans(&args.placed, &args.scans, args.seed, Gravity::Found, &bars)?;
     let scan = &found.scan;
     bars.stage("planes and objects", None);
-    let room = Room::find(scan, args.seed);
+    // The numbers are those by which `plan --object` takes a scene file's.
+    let seed = found.seed.unwrap_or(args.seed);
+    let room = Room::find(scan, seed);
     bars.clear();
     let mut table = sheet(COLUMNS);
     table.add_rows(rows(&room));
     println!("{table}");
     if let Some(path) = &args.out {
-        SceneFile::of(path, args.placed.scale, &args.scans, &found, &room, args.seed)?
-            .write(path)?;
+        SceneFile::of(path, &found, &room, seed)?.write(path)?;
         println!("scene: {}", path.display());
     }
     if let Some(path) = &args.report {

@@ -7,7 +7,7 @@ use nullsweep_surface::room::Room;
 use nullsweep_surface::{PlacedScan, Placement, ReadOptions, scan};
 use serde::{Deserialize, Serialize};
 
-use crate::floor::Placed;
+use crate::floor::{Placed, Source};
 use crate::numbers::isometry;
 use crate::room::name;
 
@@ -61,25 +61,18 @@ struct ObjectEntry {
 }
 
 impl SceneFile {
-    /// The file of a room whose scans were read by a `scale`, to be written at `path`.
-    pub(super) fn of(
-        path: &Path,
-        scale: f64,
-        scans: &[PathBuf],
-        placed: &Placed,
-        room: &Room,
-        seed: u64,
-    ) -> anyhow::Result<Self> {
+    /// The file of a room, to be written at `path`.
+    pub(super) fn of(path: &Path, placed: &Placed, room: &Room, seed: u64) -> anyhow::Result<Self> {
         let folder = std::path::absolute(path)?;
-        let mut scan = Vec::with_capacity(scans.len());
-        for ((file, view), pose) in scans.iter().zip(&placed.scan.views).zip(&placed.poses) {
+        let mut scan = Vec::with_capacity(placed.sources.len());
+        for (Source { file, scale, pose }, view) in placed.sources.iter().zip(&placed.scan.views) {
             let file = std::path::absolute(file)?;
             let near = folder.parent().and_then(|folder| file.strip_prefix(folder).ok());
             let (t, r) = (pose.translation.vector, pose.rotation.coords);
             scan.push(ScanEntry {
                 file: near.map_or_else(|| file.clone(), Path::to_path_buf),
                 points: view.points.len(),
-                scale,
+                scale: *scale,
                 pose: [t.x, t.y, t.z, r.x, r.y, r.z, r.w],
                 sensor: view.sensor.map(Into::into),
             });
@@ -120,7 +113,7 @@ impl SceneFile {
         })?;
         ensure!(!file.scan.is_empty(), "{}: a scene without scans", path.display());
         let folder = path.parent().unwrap_or(Path::new(""));
-        let (mut joined, mut poses) = (PlacedScan::default(), Vec::new());
+        let (mut joined, mut sources) = (PlacedScan::default(), Vec::new());
         for entry in &file.scan {
             let name = folder.join(&entry.file);
             let options =
@@ -138,9 +131,9 @@ impl SceneFile {
                 .with_context(|| format!("{}: pose of {}", path.display(), name.display()))?;
             let placement = Placement::Frame { pose, sensor: entry.sensor.map(Into::into) };
             joined.join(scan::place(&raw, &placement).0);
-            poses.push(pose);
+            sources.push(Source { file: name, scale: entry.scale, pose });
         }
-        Ok(Placed { scan: joined, poses, seed: Some(file.seed) })
+        Ok(Placed { scan: joined, sources, seed: Some(file.seed) })
     }
 }
 
@@ -172,7 +165,7 @@ mod tests {
         let found = read_scans(&args, &scans, 1, Gravity::Given, &bars).expect("a scan");
         let path = folder.path().join("scene.toml");
         let room = Room::find(&found.scan, 1);
-        let file = SceneFile::of(&path, args.scale, &scans, &found, &room, 7).expect("a file");
+        let file = SceneFile::of(&path, &found, &room, 7).expect("a file");
         assert_eq!(file.scan[0].file, Path::new("floor.xyz"), "from the file's folder on");
         file.write(&path).expect("written");
 
@@ -184,9 +177,17 @@ mod tests {
         let apart = |(a, b)| nalgebra::distance::<f64, 3>(a, b);
         assert!(one.points.iter().zip(&other.points).map(apart).all(|d| d < 1e-12));
         assert_eq!(again.seed, Some(7));
+        // A scene made of a scene is the same, also elsewhere.
+        let below = folder.path().join("below");
+        std::fs::create_dir(&below).expect("a folder");
+        let copy = below.join("copy.toml");
+        SceneFile::of(&copy, &again, &room, 7).expect("a file").write(&copy).expect("written");
+        let copied = read_scans(&plain, &[copy], 1, Gravity::Found, &bars).expect("the same");
+        assert_eq!(copied.scan.views[0].points, again.scan.views[0].points);
 
-        let error = read_scans(&args, &files, 1, Gravity::Found, &bars).err().expect("said twice");
-        assert!(error.to_string().contains("leave out --up"), "{error}");
+        // What a cell says of scans does not turn a scene.
+        let turned = read_scans(&args, &files, 1, Gravity::Found, &bars).expect("the same");
+        assert_eq!(turned.scan.views[0].points, again.scan.views[0].points);
         std::fs::write(&scan, rows + "0 0 1000\n").expect("written");
         let error = read_scans(&plain, &files, 1, Gravity::Found, &bars).err().expect("changed");
         assert!(error.to_string().contains("3601 points, 3600 when"), "{error}");

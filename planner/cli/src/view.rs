@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use clap::Args;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
@@ -13,7 +13,7 @@ use nullsweep_robot::{Arm, Robot};
 use nullsweep_surface::room::Room;
 
 use crate::bars::Bars;
-use crate::exit::OK;
+use crate::exit::{OK, Usage};
 use crate::picture::{Sitter, picture};
 use crate::placed::{Gravity, read_scans};
 use crate::plan::verified_rows;
@@ -54,17 +54,20 @@ pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
     let (plans, scans): (Vec<&PathBuf>, Vec<&PathBuf>) =
         args.files.iter().partition(|file| is_plan(file));
     let scans: Vec<PathBuf> = scans.into_iter().cloned().collect();
-    ensure!(
-        args.demo.is_none() || scans.is_empty(),
-        "{}: a scan beside --demo: the scene is one or the other",
-        scans.first().map_or_else(String::new, |scan| scan.display().to_string())
-    );
+    if let (Some(_), Some(scan)) = (args.demo, scans.first()) {
+        let why = "a scan beside --demo: the scene is one or the other";
+        return Err(Usage(format!("{}: {why}", scan.display())).into());
+    }
     let plans = plans.into_iter().map(|file| Plan::read(file)).collect::<Result<Vec<_>, _>>()?;
     let data = if plans.is_empty() {
-        ensure!(args.demo.is_none(), "--demo says what a plan was made for: name the plan's file");
+        if args.demo.is_some() {
+            let why = "--demo says what a plan was made for: name the plan's file";
+            return Err(Usage(why.into()).into());
+        }
         let seed = args.seed.unwrap_or(1);
-        let scan = read_scans(args.scene.placed(), &scans, seed, Gravity::Found, &bars)?.scan;
-        scene_command::picture(&scans, &scan, &Room::find(&scan, seed))
+        let found = read_scans(args.scene.placed(), &scans, seed, Gravity::Found, &bars)?;
+        let room = Room::find(&found.scan, found.seed.unwrap_or(seed));
+        scene_command::picture(&scans, &found.scan, &room)
     } else {
         of_plans(args, &plans, &scans, &bars)?
     };

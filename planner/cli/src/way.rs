@@ -121,6 +121,12 @@ impl WayArgs {
     /// What is around the arm, in the floor frame.
     fn scene(&self, way: &Way<'_>, bars: &Bars) -> anyhow::Result<Scene> {
         let swept = way.plan.filter(|plan| !plan.surface.is_empty());
+        if self.empty && !way.scans.is_empty() {
+            return Err(Usage(
+                "--empty says that nothing is around the arm: leave it out, or the scans".into(),
+            )
+            .into());
+        }
         if self.empty {
             return Ok(swept.map_or_else(Scene::empty, surface_of));
         }

@@ -80,7 +80,7 @@ pub(crate) enum Command {
     /// Run a flight recording again.
     #[command(disable_help_flag = true)]
     Replay(Rest),
-    /// Start the endpoint that the cell file names.
+    /// Start the endpoint that the cell file names, in the folder of that file.
     #[command(disable_help_flag = true)]
     Endpoint(Rest),
     /// A simulated arm that judges every setpoint.

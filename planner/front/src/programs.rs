@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
@@ -49,24 +49,27 @@ pub(crate) fn start(
     })
 }
 
-/// Becomes the endpoint that the cell file names.
+/// Becomes the endpoint that the cell file names, in the folder of that file, from which its paths are.
 ///
 /// # Errors
 /// No cell file, none in it, or it cannot be started.
-pub(crate) fn start_endpoint(args: Vec<OsString>) -> anyhow::Result<ExitCode> {
-    let given = args.windows(2).find(|pair| pair[0] == "--cell").map(|pair| pair[1].clone());
-    let given = given.or_else(|| std::env::var_os(VARIABLE)).map(PathBuf::from);
-    let found = || Cell::find(&std::env::current_dir().ok()?);
-    let Some(file) = given.or_else(found) else {
+pub(crate) fn start_endpoint(mut args: Vec<OsString>) -> anyhow::Result<ExitCode> {
+    let Some(file) = nullsweep_cell::take(&mut args) else {
         bail!("no {FILE_NAME} here or above: `nullsweep cell init` writes one");
     };
+    let file = std::path::absolute(&file)?;
+    let folder = file.parent().unwrap_or(Path::new("/"));
     let Some((program, own)) = Cell::read(&file)?.endpoint.and_then(|command| {
         let (program, own) = command.split_first()?;
         Some((program.clone(), own.to_vec()))
     }) else {
         bail!("{} names no endpoint: endpoint = [\"mock-hardware\"] would", file.display());
     };
-    let error = Command::new(path(&program)).args(own).args(args).exec();
+    // A name is looked for beside this program and on the PATH, a path is from the cell's folder on.
+    let program = if program.contains('/') { folder.join(program) } else { path(&program) };
+    let error =
+        Command::new(&program).args(own).args(args).current_dir(folder).env(VARIABLE, &file).exec();
+    let program = program.display();
     Err(error)
         .with_context(|| format!("cannot start {program}, the endpoint of {}", file.display()))
 }

@@ -86,6 +86,17 @@ fn the_endpoint_is_the_cells() {
     fs::write(folder.path().join("cell.toml"), cell).expect("written");
     let (code, told) = front(folder.path(), &["endpoint", "--seconds", "1"]);
     assert_eq!((code, told.trim_end()), (Some(7), "mock-hardware: --wrap --seconds 1"));
+    // Another cell's, from elsewhere: it runs in that cell's folder and knows that cell.
+    let other = folder.path().join("other");
+    fs::create_dir(&other).expect("a folder");
+    fs::write(other.join("own.toml"), "endpoint = [\"./arm\", \"a.urdf\"]\n").expect("written");
+    let script = "#!/bin/sh\necho \"$(basename $PWD) $(basename $NULLSWEEP_CELL): $@\"\n";
+    fs::write(other.join("arm"), script).expect("written");
+    fs::set_permissions(other.join("arm"), fs::Permissions::from_mode(0o755)).expect("a script");
+    for cell in [&["--cell=other/own.toml"][..], &["--cell", "other/own.toml"]] {
+        let (code, told) = front(folder.path(), &[&["endpoint"], cell, &["-x"]].concat());
+        assert_eq!((code, told.trim_end()), (Some(0), "other own.toml: a.urdf -x"));
+    }
 }
 
 #[test]

@@ -87,7 +87,8 @@ function misfit() {
 
 // ---- the clock -----------------------------------------------------------------------------
 
-const end = Math.max(0, ...[...plans, ...measured].map(m => m.starts_at + (m.times.at(-1) ?? 0)));
+// A plan that another one takes over from is not gone to its end.
+const end = Math.max(0, ...[...plans.slice(-1), ...measured].map(m => m.starts_at + (m.times.at(-1) ?? 0)));
 const player = { time: 0, speed: 1, playing: false };
 
 /** The plan that moves the arm at a time: the last one that has begun. */
@@ -282,7 +283,7 @@ function repaint(by) {
     space.reline(on, new Float32Array(pieces.flatMap(p => p.data)));
   }
   scale();
-  space.touch();
+  space?.touch();
 }
 
 function scale() {
@@ -292,7 +293,10 @@ function scale() {
 }
 
 /** A ball about what matters: the given focus. */
-function overview(at_once) { space.mark = null; space.fly(data.focus.at, data.focus.radius, { turn: data.focus.turn, tilt: 0.45 }, at_once); }
+function overview(at_once) {
+  if (!space) return;
+  space.mark = null; space.fly(data.focus.at, data.focus.radius, { turn: data.focus.turn, tilt: 0.45 }, at_once);
+}
 
 // ---- the list ------------------------------------------------------------------------------
 

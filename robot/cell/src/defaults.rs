@@ -1,10 +1,44 @@
 //! A cell as defaults of flags.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 
-use clap::{Arg, Command};
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Command};
 
 use crate::file::Cell;
+
+/// Every flag that a cell may give.
+pub const FLAGS: [&str; 25] = [
+    "robot-name",
+    "ipc-root",
+    "urdf",
+    "arm",
+    "tool",
+    "srdf",
+    "fit-capsules",
+    "v-max",
+    "profile",
+    "base",
+    "up",
+    "sensor-height",
+    "support-height",
+    "table",
+    "unseen",
+    "scale",
+    "rate",
+    "cpu",
+    "priority",
+    "record",
+    "start",
+    "initial",
+    // Of these each value has a name, NAME=VALUE.
+    NAMED[0],
+    NAMED[1],
+    NAMED[2],
+];
+
+/// Flags whose values have names: what is given adds to what a cell has, and wins by the name.
+const NAMED: [&str; 3] = ["package", "held", "posture"];
 
 /// Values of flags by their long names; one that may be repeated has several.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,6 +117,45 @@ impl Defaults {
         self.0.iter().find(|(flag, _)| *flag == long).map(|(_, values)| &values[..])
     }
 
+    /// What of the named values stands beside those that the command line gives, as flags, and the
+    /// subcommands that it is to be given to.
+    pub(crate) fn beside<'a>(
+        &self,
+        command: &'a Command,
+        matches: &'a ArgMatches,
+    ) -> (Vec<&'a str>, Vec<OsString>) {
+        if let Some((name, matches)) = matches.subcommand()
+            && let Some(command) = command.find_subcommand(name)
+        {
+            let (mut path, flags) = self.beside(command, matches);
+            path.insert(0, name);
+            return (path, flags);
+        }
+        let name = |value: &OsStr| {
+            let text = value.to_string_lossy();
+            text.split_once('=')
+                .map_or_else(|| text.to_lowercase(), |(name, _)| name.to_lowercase())
+        };
+        let mut flags = Vec::new();
+        for arg in command.get_arguments() {
+            let (Some(long), id) = (arg.get_long(), arg.get_id().as_str()) else { continue };
+            // What the cell was kept from giving here has no default.
+            let is_open = NAMED.contains(&long) && !arg.get_default_values().is_empty();
+            if !is_open || matches.value_source(id) != Some(ValueSource::CommandLine) {
+                continue;
+            }
+            let given: Vec<String> = matches.get_raw(id).into_iter().flatten().map(name).collect();
+            for value in self.of(arg).unwrap_or_default() {
+                if !given.contains(&name(value)) {
+                    let mut flag = OsString::from(format!("--{long}="));
+                    flag.push(value);
+                    flags.push(flag);
+                }
+            }
+        }
+        (Vec::new(), flags)
+    }
+
     /// Puts them into a command and all below it. `apart`: subcommands that go without some.
     pub(crate) fn furnish(&self, mut command: Command, apart: &[(&str, &[&str])]) -> Command {
         let given: Vec<_> = command
@@ -100,5 +173,26 @@ impl Defaults {
             command = command.mut_subcommand(name, |sub| own.furnish(sub, apart));
         }
         command
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_flag_that_a_cell_gives_is_listed() {
+        let all = "robot = \"a\"\nipc_root = \"b\"\nurdf = \"c\"\narm = \"d,e\"\ntool = \"f\"\n\
+            srdf = \"g\"\nfit_capsules = 0.05\nendpoint = [\"h\"]\n[packages]\ni = \"j\"\n\
+            [held]\nk = 0.1\n[postures]\nhome = [0]\n[limits]\nv_max = 1\nprofile = \"velocity\"\n\
+            [scene]\nbase = [0, 0, 0]\nup = [0, 0, 1]\nsensor_height = 1\nsupport_height = 1\n\
+            table = [1, 1]\nunseen = \"free\"\nscale = 1\n\
+            [executor]\nrate = 1000\ncpu = 1\npriority = 5\nrecord = \"l\"\n";
+        let cell: Cell = toml::from_str(all).expect("a cell");
+        let mut given: Vec<&str> = Defaults::from(&cell).0.iter().map(|(flag, _)| *flag).collect();
+        let mut listed = FLAGS.to_vec();
+        given.sort_unstable();
+        listed.sort_unstable();
+        assert_eq!(given, listed);
     }
 }

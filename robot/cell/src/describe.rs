@@ -72,6 +72,11 @@ impl Described {
         &self.name
     }
 
+    /// What is asked for by `--NAME`.
+    pub fn flags(&self) -> impl Iterator<Item = &str> {
+        self.args.iter().filter_map(|arg| arg.long.as_deref())
+    }
+
     /// A command that is described alike, under a name.
     #[must_use]
     pub fn into_command(self, name: String) -> Command {

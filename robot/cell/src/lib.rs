@@ -11,7 +11,7 @@ mod file;
 mod parse;
 
 pub use causes::causes;
-pub use defaults::Defaults;
+pub use defaults::{Defaults, FLAGS};
 pub use describe::{DESCRIBE, Described};
 pub use file::{Cell, CellError, FILE_NAME};
-pub use parse::{VARIABLE, parse, parse_alone};
+pub use parse::{VARIABLE, parse, parse_alone, take};

@@ -2,6 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
+use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
@@ -31,10 +32,9 @@ pub fn parse<P: Parser>(
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
     let command = P::command().arg(cell_argument());
     describe(&args, &command);
-    let given = given(&args).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from));
-    let found = || std::env::current_dir().ok().and_then(|folder| Cell::find(&folder));
-    let path = given.clone().or_else(found).filter(|path| !path.as_os_str().is_empty());
-    let Some(path) = path else {
+    let given = given(&args).map(|(_, path)| path).or_else(variable);
+    let is_given = given.is_some();
+    let Some(path) = chosen(given) else {
         let mut matches = command.try_get_matches_from(args)?;
         return P::from_arg_matches_mut(&mut matches);
     };
@@ -49,10 +49,17 @@ pub fn parse<P: Parser>(
             return Err(Error::raw(ErrorKind::ValueValidation, text));
         }
     };
-    let defaults = Defaults::from(&cell);
+    let own = apart.iter().find(|(sub, _)| sub.is_empty()).map_or(&[][..], |(_, flags)| flags);
+    let defaults = Defaults::from(&cell).without(own);
     let mut furnished = defaults.furnish(command, apart);
-    let mut matches = furnished.try_get_matches_from_mut(args)?;
-    if given.is_none() && is_used(&defaults, &furnished, &matches) {
+    let mut matches = furnished.try_get_matches_from_mut(&args)?;
+    let (path_to, beside) = defaults.beside(&furnished, &matches);
+    let adds = !beside.is_empty();
+    if adds {
+        let args = inserted(args, &path_to, beside);
+        matches = furnished.try_get_matches_from_mut(args)?;
+    }
+    if !is_given && (adds || is_used(&defaults, &furnished, &matches)) {
         say(&format!("note: what is not given is taken from {}", path.display()));
     }
     P::from_arg_matches_mut(&mut matches)
@@ -106,18 +113,51 @@ fn cell_argument() -> Arg {
     Arg::new("cell").long("cell").value_name("FILE").global(true).help(help)
 }
 
-/// The file that the arguments name.
-fn given(args: &[OsString]) -> Option<PathBuf> {
-    let mut args = args.iter().take_while(|arg| *arg != "--");
-    while let Some(arg) = args.next() {
+/// Where among the arguments a file is named, and the file.
+fn given(args: &[OsString]) -> Option<(Range<usize>, PathBuf)> {
+    let end = args.iter().position(|arg| arg == "--").unwrap_or(args.len());
+    args[..end].iter().enumerate().find_map(|(i, arg)| {
         if arg == "--cell" {
-            return args.next().map(PathBuf::from);
+            return Some((i..i + 2, args.get(i + 1)?.into()));
         }
-        if let Some(path) = arg.to_str().and_then(|arg| arg.strip_prefix("--cell=")) {
-            return Some(path.into());
+        let path = arg.to_str()?.strip_prefix("--cell=")?;
+        Some((i..i + 1, path.into()))
+    })
+}
+
+/// The file that [`VARIABLE`] names.
+fn variable() -> Option<PathBuf> {
+    std::env::var_os(VARIABLE).map(PathBuf::from)
+}
+
+/// The file that was given, where it is not empty; without one, the nearest.
+fn chosen(given: Option<PathBuf>) -> Option<PathBuf> {
+    let found = || Cell::find(&std::env::current_dir().ok()?);
+    given.or_else(found).filter(|path| !path.as_os_str().is_empty())
+}
+
+/// The cell file as [`parse`] takes it, for a program that passes its arguments on: what names it among
+/// them is taken out.
+pub fn take(args: &mut Vec<OsString>) -> Option<PathBuf> {
+    let named = given(args).map(|(at, path)| {
+        args.drain(at);
+        path
+    });
+    chosen(named.or_else(variable))
+}
+
+/// A command line with flags of a subcommand put behind its name.
+fn inserted(mut args: Vec<OsString>, path: &[&str], flags: Vec<OsString>) -> Vec<OsString> {
+    let mut at = 1;
+    for name in path {
+        while at < args.len() && args[at] != *name {
+            at += if args[at] == "--cell" { 2 } else { 1 };
         }
+        at += 1;
     }
-    None
+    let at = at.min(args.len());
+    args.splice(at..at, flags);
+    args
 }
 
 /// Whether any value was taken from the cell.
@@ -217,10 +257,27 @@ mod tests {
         assert_eq!(posture, ["home=0,-1.5", "start=0.5,0.25"]);
         let own = ["plan", "--posture", "a=1"];
         let Ok(Sub::Plan { arm, posture, .. }) = with(folder.path(), &own) else { panic!("sound") };
-        assert_eq!((arm.as_str(), &posture[..]), ("base_link,tool_tip", &["a=1".to_owned()][..]));
+        assert_eq!(arm, "base_link,tool_tip");
+        assert_eq!(posture, ["home=0,-1.5", "start=0.5,0.25", "a=1"]);
+        let own = ["plan", "--posture", "a=1", "--posture=Home=7", "--arm", "plan"];
+        let Ok(Sub::Plan { posture, .. }) = with(folder.path(), &own) else { panic!("sound") };
+        assert_eq!(posture, ["start=0.5,0.25", "a=1", "Home=7"], "given wins by the name");
         let Ok(Sub::Replan { base: None }) = with(folder.path(), &["replan"]) else {
             panic!("it goes without");
         };
+    }
+
+    #[test]
+    fn what_names_a_cell_is_taken_out_of_arguments_that_are_passed_on() {
+        for words in [&["--wrap", "--cell", "a.toml", "-x"][..], &["--cell=a.toml", "--wrap", "-x"]]
+        {
+            let mut args: Vec<OsString> = words.iter().map(Into::into).collect();
+            assert_eq!(take(&mut args), Some("a.toml".into()));
+            assert_eq!(args, ["--wrap", "-x"]);
+        }
+        let mut args: Vec<OsString> = ["--", "--cell", "a.toml"].map(Into::into).into();
+        let _ = take(&mut args);
+        assert_eq!(args.len(), 3, "what stands behind -- is not ours");
     }
 
     #[test]

@@ -95,7 +95,7 @@ pub fn suite<H: Hardware, C: Clock>(
 
 /// Runs with the arguments of a command line, program name first.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Args = match nullsweep_cell::parse(args, &[], &[]) {
+    let args: Args = match nullsweep_cell::parse(args, &[("", &["priority"])], &[]) {
         Ok(args) => args,
         Err(error) => error.exit(),
     };

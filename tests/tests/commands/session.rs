@@ -1,5 +1,6 @@
 //! A shell in which all programs of the house are on the PATH, in a copy of the examples.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
@@ -16,20 +17,18 @@ const MOCK: &str = env!("CARGO_BIN_EXE_mock-hardware");
 /// A loaded machine may stall a process for longer than a robot would bear.
 const PATIENCE: &str = "--stale-ms 500 --lost-ms 1500 --min-rate 0.01 --spin-us 0";
 
-/// Commands of the front that are neither planner's nor executor's.
-const OTHERS: [&str; 11] = [
-    "mock",
-    "endpoint",
-    "demo",
-    "conformance",
-    "latency",
-    "kills",
-    "soak",
-    "doctor",
-    "completions",
-    "man",
-    "help",
+/// Programs that are one command of the front, and that command.
+const WHOLE: [(&str, &str, &str); 6] = [
+    ("mock-hardware", "mock", MOCK),
+    ("demo", "demo", DEMO),
+    ("conformance", "conformance", env!("CARGO_BIN_EXE_conformance")),
+    ("latency", "latency", env!("CARGO_BIN_EXE_latency")),
+    ("kills", "kills", env!("CARGO_BIN_EXE_kills")),
+    ("soak", "soak", env!("CARGO_BIN_EXE_soak")),
 ];
+
+/// Commands of the front that start no program of a name of its own.
+const OWN: [&str; 5] = ["endpoint", "doctor", "completions", "man", "help"];
 
 /// A session.
 pub(crate) struct Session {
@@ -116,32 +115,65 @@ pub(crate) fn call(command: &str) -> Option<(Vec<String>, Vec<String>)> {
         _ => words,
     };
     let (program, rest) = words.split_first()?;
-    let program = match (*program, rest.first()) {
-        ("nullsweep", Some(&("run" | "ctl" | "top" | "replay"))) => "executor",
-        ("nullsweep", Some(command)) if !OTHERS.contains(command) => "planner",
-        ("planner" | "executor", _) => program,
-        _ => return None,
+    let whole = |name: &str| WHOLE.iter().find(|(program, ..)| *program == name).map(|w| w.0);
+    let (program, rest) = match (*program, rest.split_first()) {
+        ("nullsweep", Some((&command, behind))) => {
+            match WHOLE.iter().find(|(_, name, _)| *name == command) {
+                Some((program, ..)) => (*program, behind),
+                None if OWN.contains(&command) => return None,
+                None if ["run", "ctl", "top", "replay"].contains(&command) => ("executor", rest),
+                None => ("planner", rest),
+            }
+        }
+        ("planner" | "executor", _) => (*program, rest),
+        _ => (whole(program)?, rest),
     };
+    if whole(program).is_some() {
+        return Some((vec![program.to_owned()], flags(rest)));
+    }
     let is_name = |word: &&&str| word.chars().all(|c| c.is_ascii_lowercase());
     let deep = if rest.first().is_some_and(|word| ["cell", "ctl"].contains(word)) { 2 } else { 1 };
     let below = rest.iter().filter(is_name).take(deep).map(ToString::to_string);
-    let flags = rest.iter().filter(|word| word.starts_with("--"));
-    let flags = flags.map(|flag| flag.split('=').next().unwrap_or_default().to_owned()).collect();
-    Some((std::iter::once(program.to_owned()).chain(below).collect(), flags))
+    Some((std::iter::once(program.to_owned()).chain(below).collect(), flags(rest)))
+}
+
+/// The names of the flags among words.
+fn flags(words: &[&str]) -> Vec<String> {
+    let flags = words.iter().filter(|word| word.starts_with("--") && word.len() > 2);
+    flags.map(|flag| flag.split('=').next().unwrap_or_default().to_owned()).collect()
 }
 
 /// The commands of a program, by what it tells of itself.
 pub(crate) fn commands(program: &str) -> Vec<String> {
-    let output = Command::new(DEMO).args([&format!("__{program}"), DESCRIBE]).output();
-    let text = String::from_utf8(output.expect("it starts").stdout).expect("text");
-    let told = Described::from_json(&text).expect("a description");
-    told.below().iter().map(|below| below.name().to_owned()).collect()
+    described(program).below().iter().map(|below| below.name().to_owned()).collect()
 }
 
-/// What a program says of itself.
-pub(crate) fn help(words: &[String]) -> String {
-    let mut command = Command::new(DEMO);
-    command.arg(format!("__{}", words[0])).args(&words[1..]).arg("--help");
-    let output = command.env(nullsweep_cell::VARIABLE, "").output().expect("it starts");
-    String::from_utf8_lossy(&output.stdout).into_owned()
+/// The flags that a program's command takes.
+pub(crate) fn flags_of(words: &[String]) -> BTreeSet<String> {
+    let (program, below) = words.split_first().expect("a program");
+    let mut told = described(program);
+    let own = |told: &Described| told.flags().map(|flag| format!("--{flag}")).collect::<Vec<_>>();
+    let mut all: BTreeSet<String> = ["--help".into(), "--version".into()].into();
+    all.extend(own(&told));
+    for name in below {
+        // What is no command is what the command works on.
+        let Some(sub) = told.below().into_iter().find(|sub| sub.name() == name) else { break };
+        all.extend(own(&sub));
+        told = sub;
+    }
+    all
+}
+
+/// What a program tells of itself.
+fn described(program: &str) -> Described {
+    let mut command = match WHOLE.iter().find(|(name, ..)| *name == program) {
+        Some((.., path)) => Command::new(path),
+        None => Command::new(DEMO),
+    };
+    if WHOLE.iter().all(|(name, ..)| *name != program) {
+        command.arg(format!("__{program}"));
+    }
+    let output = command.arg(DESCRIBE).env(nullsweep_cell::VARIABLE, "").output();
+    let text = String::from_utf8(output.expect("it starts").stdout).expect("text");
+    Described::from_json(&text).expect("a description")
 }

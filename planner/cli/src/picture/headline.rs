@@ -5,6 +5,7 @@ use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Headline, Look, Motion, Tone};
 
+use super::motion::REACH;
 use super::points::Points;
 use super::robot::Shown;
 use super::sitter::Sitter;
@@ -59,7 +60,8 @@ pub(super) fn headline(
         .fold(f64::INFINITY, f64::min);
     if least.is_finite() {
         let detail = "of the arm without its hand, at the looked-at times".into();
-        tell("Least clearance", format!("{least:.0} mm"), detail, Tone::Plain);
+        let over = if least < 1e3 * REACH { "" } else { "over " };
+        tell("Least clearance", format!("{over}{least:.0} mm"), detail, Tone::Plain);
     }
     (headline, notes(plan, here, robot, sitter.verification))
 }

@@ -14,7 +14,7 @@ use super::sitter::Sitter;
 /// At how many times of a plan the clearance is looked for.
 const CLEARANCES: usize = 240;
 /// Farthest that a clearance is told. \[m\]
-const REACH: f64 = 0.1;
+pub(super) const REACH: f64 = 0.1;
 /// At how many times the page's own kinematics is compared with ours.
 const PROBES: usize = 60;
 
