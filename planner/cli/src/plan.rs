@@ -254,6 +254,7 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
             scene: Some(scene),
             verification: Some(&figures.verification),
             left_out: &figures.left_out,
+            flights: &[],
             tables: vec![figures_table(figures)],
             lines: vec![report::LineSet {
                 name: "graph".into(),

@@ -361,12 +361,15 @@ function rowsOf(what) {
     return data.joints.map((joint, j) => ({ name: title(joint), unit: `${joint.unit}/s`,
       lines: both(m => velocities(m, j)) }));
   }
-  const names = [...new Set(plans.flatMap(m => m.series.map(s => s.name)))];
-  const first = name => plans.flatMap(m => m.series).find(s => s.name === name);
+  const of = name => m => m.series.find(s => s.name === name);
+  const with_ = (motions, name) => motions.filter(of(name));
+  const all = [...plans, ...measured];
+  const names = [...new Set(all.flatMap(m => m.series.map(s => s.name)))];
+  const first = name => of(name)(with_(all, name)[0]);
   return names.map(name => ({ name: name.replace(', ', '\n'), unit: first(name).unit,
     most: first(name).most ?? Infinity, zero: true, digits: 1,
-    lines: lines(plans.filter(m => m.series.some(s => s.name === name)),
-      m => m.series.find(s => s.name === name), COLOURS) }));
+    lines: [...lines(with_(plans, name), of(name), COLOURS),
+      ...lines(with_(measured, name), of(name), ['--measured'])] }));
 }
 
 /** Stretches of time in which what runs is off the surface. */
@@ -468,7 +471,7 @@ function buildPlayer() {
   curves = new Curves($('plot'), t => { play(false); seek(t); });
   for (const button of $('tabs').querySelectorAll('[data-tab]')) {
     button.onclick = () => tab(button.dataset.tab);
-    if (button.dataset.tab === 'distances' && !plans.some(m => m.series.length)) button.remove();
+    if (button.dataset.tab === 'distances' && ![...plans, ...measured].some(m => m.series.length)) button.remove();
   }
   tab('positions');
 }

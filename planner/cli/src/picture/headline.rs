@@ -1,11 +1,14 @@
 //! The figures that matter most, and what they rest on.
 
 use nullsweep_planner::plan::Plan;
+use nullsweep_planner::sweep::coverage;
 use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Headline, Look, Motion, Tone};
+use nullsweep_robot::Arm;
 
-use super::points::Points;
+use super::flight::Flight;
+use super::points::{Points, shares, surface};
 use super::robot::Shown;
 use super::sitter::Sitter;
 
@@ -50,6 +53,17 @@ pub(super) fn headline(
         n => format!("{n} plans, the last takes over at {:.1} s", motions[n - 1].starts_at),
     };
     tell("Time", format!("{end:.1} s"), detail, Tone::Plain);
+    for flight in sitter.flights {
+        let begins = motions.get(flight.first).map_or(0.0, |m| m.starts_at);
+        if let Some((value, detail)) = deviation(flight, sitter.arm, begins) {
+            tell("Largest deviation", value, detail, Tone::Plain);
+        }
+        let swept = measured_shares(plan, sitter.arm, flight);
+        if let [Some(of_reachable), Some(of_all)] = swept {
+            let detail = format!("of reachable, as measured; {} of all", percent(of_all));
+            tell("Swept in fact", percent(of_reachable), detail, Tone::Plain);
+        }
+    }
     let (value, detail, tone) = violations(plan, sitter.verification);
     tell("Violations", value, detail, tone);
     let least = motions
@@ -62,6 +76,26 @@ pub(super) fn headline(
         tell("Least clearance", format!("{least:.0} mm"), detail, Tone::Plain);
     }
     (headline, notes(plan, here, robot, sitter.verification))
+}
+
+/// How far a measured joint was from its setpoint, and where; `begins`: the flight's start on the page's
+/// clock. \[s\]
+pub(super) fn deviation(flight: &Flight, arm: &Arm, begins: f64) -> Option<(String, String)> {
+    let (j, by, at) = flight.joint?;
+    let unit = if arm.is_revolute(j) { "rad" } else { "m" };
+    let name = &arm.joint_names()[j];
+    let mut detail = format!("of {name} from its setpoint, at {:.1} s", begins + at);
+    if let Some((by, at)) = flight.pad {
+        detail += &format!("; of the pad {:.1} mm, at {:.1} s", 1e3 * by, begins + at);
+    }
+    Some((format!("{by:.4} {unit}"), detail))
+}
+
+/// Shares of the points that the measured arm swept: of those that are reachable, of all.
+fn measured_shares(plan: &Plan, arm: &Arm, flight: &Flight) -> [Option<f64>; 2] {
+    let pad = plan.tool.on(arm);
+    let poses: Vec<_> = flight.swept.iter().map(|q| pad.pose(q)).collect();
+    shares(plan, &coverage::swept(&surface(plan), &poses, &plan.tool))
 }
 
 fn violations(plan: &Plan, verification: Option<&Verification>) -> (String, String, Tone) {
