@@ -24,7 +24,7 @@ use crate::choices::{CostArg, MethodArg, ProfileArg};
 use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::{Held, Place, finite, not_negative, percent, positive, velocity};
-use crate::output::writable;
+use crate::output::{say, writable};
 use crate::picture::{Sitter, picture};
 use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
@@ -269,12 +269,12 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
     }
     let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
     if !to_stdout {
-        println!("{}", table(figures));
+        say!("{}", table(figures));
     }
     if code == OK && !to_stdout {
-        println!("plan: {}", args.out.display());
+        say!("plan: {}", args.out.display());
         if let Some(path) = &args.report {
-            println!("report: {}", path.display());
+            say!("report: {}", path.display());
         }
     }
     Ok(code)

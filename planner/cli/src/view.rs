@@ -15,7 +15,7 @@ use nullsweep_surface::room::Room;
 
 use crate::bars::Bars;
 use crate::exit::OK;
-use crate::output::writable;
+use crate::output::{say, tell, writable};
 use crate::picture::{Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
 use crate::plan::verified_rows;
@@ -89,10 +89,11 @@ pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
     };
     bars.clear();
     report::write(&out, &data)?;
-    println!("page: {}", out.display());
+    say!("page: {}", out.display());
     if let Some(path) = &args.mcap {
-        report::write_log(path, &data)?;
-        println!("log: {}", path.display());
+        let there = || format!("cannot write {}", path.display());
+        report::write_log(path, &data).with_context(there)?;
+        say!("log: {}", path.display());
     }
     if !args.no_open {
         open(&out);
@@ -203,7 +204,7 @@ fn open(page: &Path) {
     let has_screen = cfg!(target_os = "macos")
         || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
     if !has_screen {
-        println!("there is no screen here: open the page in a browser");
+        tell!("there is no screen here: open the page in a browser");
         return;
     }
     let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
@@ -215,6 +216,6 @@ fn open(page: &Path) {
         .spawn()
         .with_context(|| format!("{program} cannot be started"));
     if let Err(error) = started {
-        println!("{error:#}: open the page in a browser");
+        tell!("{error:#}: open the page in a browser");
     }
 }

@@ -56,6 +56,51 @@ fn an_output_that_cannot_be_written_is_told_before_the_work() {
         assert!(said.contains("cannot write no/such/folder/x"), "{flag}: {said}");
         assert_eq!(said.matches("No such file").count(), 1, "{said}");
     }
+    for command in [
+        "scene missing.pcd --out",
+        "scene missing.pcd --report",
+        "verify missing.json --out",
+        "verify missing.json --json",
+        "task missing.csv --out",
+        "task missing.csv --json",
+        "view missing.json --no-open --out",
+        "view missing.json --no-open --mcap",
+    ] {
+        let (code, _, said) = run(folder.path(), &format!("{command} no/such/folder/x"));
+        assert_eq!(code, Some(1), "{said}");
+        assert!(said.contains("cannot write no/such/folder/x"), "{command}: {said}");
+    }
+}
+
+#[test]
+fn a_full_disk_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    long_plan(&folder.path().join("plan.json"));
+    let told = |said: &str| {
+        assert_eq!(said.matches("No space left").count(), 1, "{said}");
+        assert!(said.starts_with("planner: ") && !said.contains("panicked"), "{said}");
+    };
+    for command in
+        ["inspect plan.json", "inspect plan.json --json -", "view plan.json --no-open --out v.html"]
+    {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+        let done = planner(folder.path(), command).stdout(full).output().expect("it starts");
+        assert_eq!(done.status.code(), Some(1), "{command}");
+        let said = String::from_utf8(done.stderr).expect("text");
+        told(&said);
+        assert!(said.contains("standard output"), "{said}");
+    }
+    for command in [
+        "inspect plan.json --json /dev/full",
+        "export plan.json --format csv --out /dev/full",
+        "view plan.json --no-open --out /dev/full",
+        "view plan.json --no-open --out v.html --mcap /dev/full",
+    ] {
+        let (code, _, said) = run(folder.path(), command);
+        assert_eq!(code, Some(1), "{said}");
+        told(&said);
+        assert!(said.contains("/dev/full"), "{said}");
+    }
 }
 
 #[test]

@@ -407,8 +407,12 @@ function refresh() {
   }
   $('time').value = player.time;
   const knot = before(running.times, own);
-  const on = running.contact ? (running.contact[Math.min(knot + 1, running.times.length - 1)] === 1 ? 'on the surface' : 'in transfer') : '';
-  $('now').textContent = `${player.time.toFixed(2)} of ${end.toFixed(1)} s · ${plans.length > 1 ? `${running.name}, ` : ''}knot ${knot} · ${on}`;
+  const ahead = Math.min(knot + 1, running.times.length - 1);
+  const words = [`${player.time.toFixed(2)} of ${end.toFixed(1)} s`,
+    `${plans.length > 1 ? `${running.name}, ` : ''}knot ${knot}`];
+  if (running.contact) words.push(running.contact[ahead] === 1 ? 'on the surface' : 'in transfer');
+  $('now').textContent = words.join(' · ');
+  if (document.activeElement !== $('knot')) $('knot').value = knot;
   curves?.cursor(player.time);
 }
 
@@ -498,8 +502,8 @@ function keys(e) {
 }
 
 /** What a test asks. */
-window.nullsweep = { player, seek, padAt, jointsAt, plans, misfit, frames, visit, end,
-  get camera() { return space?.camera; }, bodies: () => moving };
+window.nullsweep = { player, seek, padAt, jointsAt, plans, measured, misfit, runningAt, frames, visit, end,
+  get camera() { return space?.camera; }, draw: () => space?.finish(player.time), bodies: () => moving };
 
 theme(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 $('theme').onclick = () => theme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark');

@@ -130,12 +130,16 @@ pub(crate) fn call(command: &str) -> Option<(Vec<String>, Vec<String>)> {
     Some((std::iter::once(program.to_owned()).chain(below).collect(), flags))
 }
 
-/// The commands of a program, by what it tells of itself.
-pub(crate) fn commands(program: &str) -> Vec<String> {
+/// What a program tells of itself.
+pub(crate) fn described(program: &str) -> Described {
     let output = Command::new(DEMO).args([&format!("__{program}"), DESCRIBE]).output();
     let text = String::from_utf8(output.expect("it starts").stdout).expect("text");
-    let told = Described::from_json(&text).expect("a description");
-    told.below().iter().map(|below| below.name().to_owned()).collect()
+    Described::from_json(&text).expect("a description")
+}
+
+/// The commands of a program.
+pub(crate) fn commands(program: &str) -> Vec<String> {
+    described(program).below().iter().map(|below| below.name().to_owned()).collect()
 }
 
 /// What a program says of itself.

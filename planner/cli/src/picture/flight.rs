@@ -6,11 +6,13 @@ use anyhow::{bail, ensure};
 use nullsweep_ipc_types::PlanId;
 use nullsweep_planner::plan::Plan;
 use nullsweep_recording::{CycleRecord, RecordedPlan, Recording};
-use nullsweep_report::{Motion, Series};
+use nullsweep_report::{Motion, Probe, Series};
 use nullsweep_robot::{Arm, JointVector, Tool};
 
 /// Shortest time between two positions that are shown, and between two that sweep. \[s\]
 const STEP: (f64, f64) = (0.02, 0.005);
+/// At how many times the page's own kinematics is compared with ours.
+const PROBES: usize = 60;
 /// Most positions that are shown.
 const MOST: f64 = 15_000.0;
 
@@ -106,8 +108,11 @@ impl Flight {
             .map(|c| (seconds(c.now_ns, span.from_ns), c.target.q))
             .collect();
         let targets = thinned(&targets, |t| t.0, step, |_| false);
+        let probe = |t: &&(f64, JointVector)| Probe { time: t.0, pad: pad.centre(&t.1) };
+        let stride = targets.len().div_ceil(PROBES).max(1);
         let commanded = Motion {
             name: "commanded".into(),
+            probes: targets.iter().step_by(stride).map(probe).collect(),
             times: targets.iter().map(|t| t.0).collect(),
             joints: each(&targets.iter().map(|t| t.1).collect::<Vec<_>>()),
             ..Motion::default()
@@ -162,12 +167,20 @@ impl Span {
             let (from_ns, to_ns) = cycles(&ran);
             return Ok(Self { from_ns, to_ns, first: 0, ran: ran.len() });
         }
-        let run_of = |plan: &Plan| {
+        // From the last plan on backwards: each as it ran last before the one that came after it.
+        let mut found: Vec<(usize, &RecordedPlan)> = Vec::new();
+        let mut before_ns = u64::MAX;
+        for (i, plan) in plans.iter().enumerate().rev() {
             let same = recording.plans.iter().filter(|recorded| is_of(recorded, plan));
-            same.filter(|recorded| ran.contains(&recorded.id)).last()
-        };
-        let found: Vec<(usize, &RecordedPlan)> =
-            plans.iter().enumerate().filter_map(|(i, plan)| Some((i, run_of(plan)?))).collect();
+            let runs = same.filter(|recorded| ran.contains(&recorded.id));
+            let begun = runs.map(|recorded| (cycles(&[recorded.id]).0, recorded));
+            let last =
+                begun.filter(|(begun, _)| *begun < before_ns).max_by_key(|(begun, _)| *begun);
+            if let Some((begun, recorded)) = last {
+                before_ns = begun;
+                found.insert(0, (i, recorded));
+            }
+        }
         let Some(&(first, begin)) = found.first() else {
             let others = match ran.len() {
                 1 => "1 other did".into(),

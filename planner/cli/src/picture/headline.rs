@@ -45,11 +45,16 @@ pub(super) fn headline(
         let detail = format!("of {} scanned points", points.all);
         tell("Swept of all", percent(share), detail, Tone::Plain);
         let tone = if points.left == 0 { Tone::Good } else { Tone::Plain };
-        tell("Left", percent(left), format!("in {places} places, by cause in the list"), tone);
+        tell(
+            "Left",
+            percent(left),
+            format!("in {}, by cause in the list", count(places, "place")),
+            tone,
+        );
     }
     let end = motions.last().map_or(0.0, |m| m.starts_at + m.times.last().copied().unwrap_or(0.0));
     let detail = match motions.len() {
-        1 => format!("{} knots", plan.knots.len()),
+        1 => count(plan.knots.len(), "knot"),
         n => format!("{n} plans, the last takes over at {:.1} s", motions[n - 1].starts_at),
     };
     tell("Time", format!("{end:.1} s"), detail, Tone::Plain);
@@ -98,6 +103,11 @@ fn measured_shares(plan: &Plan, arm: &Arm, flight: &Flight) -> [Option<f64>; 2] 
     shares(plan, &coverage::swept(&surface(plan), &poses, &plan.tool))
 }
 
+/// How many there are of what, in one word or two.
+fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 fn violations(plan: &Plan, verification: Option<&Verification>) -> (String, String, Tone) {
     let Some(found) = verification else {
         return match plan.check_seal() {
@@ -110,7 +120,8 @@ fn violations(plan: &Plan, verification: Option<&Verification>) -> (String, Stri
     let against = &found.against;
     let measured = against.surface_points + against.other_points + against.raw_points;
     let unseen = if against.unseen_points > 0 { ", unseen space" } else { "" };
-    let detail = format!("against {measured} points{unseen}, {} obstacles", against.obstacles);
+    let obstacles = count(against.obstacles, "obstacle");
+    let detail = format!("against {measured} points{unseen}, {obstacles}");
     let tone = if found.violations.is_empty() { Tone::Good } else { Tone::Bad };
     (found.violations.len().to_string(), detail, tone)
 }
