@@ -12,6 +12,7 @@ use nullsweep_surface::{PlacedScan, Placement, RawScan, ReadOptions, scan};
 
 use crate::advice;
 use crate::bars::Bars;
+use crate::exit::Usage;
 use crate::floor::Placed;
 use crate::numbers::{Numbers, finite, isometry, not_negative, positive};
 use crate::scene_file::SceneFile;
@@ -61,19 +62,29 @@ pub(super) fn read_scans(
     if let [path] = scans
         && path.extension().is_some_and(|extension| extension == "toml")
     {
-        let given = args.up.is_some() || !args.sensor_pose.is_empty() || args.scale != 1.0;
         ensure!(
-            !given,
-            "{}: a scene file says how its scans stand: leave out --up, --sensor-pose and --scale",
-            path.display()
+            args.sensor_pose.is_empty(),
+            Usage(format!(
+                "{}: a scene file says how its scans stand: leave out --sensor-pose",
+                path.display()
+            ))
         );
+        // A cell file may say it of all other scans.
+        if args.up.is_some() || args.scale != 1.0 {
+            bars.note(&format!(
+                "{} says how its scans stand: --up and --scale are not heeded",
+                path.display()
+            ));
+        }
         return SceneFile::read(path);
     }
     ensure!(
         args.sensor_pose.is_empty() || args.sensor_pose.len() == scans.len(),
-        "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
-        scans.len(),
-        args.sensor_pose.len()
+        Usage(format!(
+            "--sensor-pose is there {} times for {} scans: one for each, in their order",
+            args.sensor_pose.len(),
+            scans.len()
+        ))
     );
     let options = ReadOptions { scale: args.scale, seed, ..ReadOptions::default() };
     let mut files = Vec::with_capacity(scans.len());

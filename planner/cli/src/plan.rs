@@ -291,12 +291,13 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         n => format!("{n} of unseen space"),
     };
     let found = violations(v.violations.len(), &a.guessed_links);
+    let obstacles = if a.obstacles == 1 { "obstacle" } else { "obstacles" };
     let against = format!(
-        "{} points of the surface, {} others, {} raw, {unseen}, {} obstacles",
+        "{} points of the surface, {} others, {} raw, {unseen}, {} {obstacles}",
         a.surface_points, a.other_points, a.raw_points, a.obstacles
     );
     let distance = (mm(v.scan_distance_p95_m), mm(v.scan_distance_max_m));
-    [
+    let rows = [
         ("coverage of reachable points", percent(v.coverage_reachable)),
         ("coverage of all points", percent(v.coverage_all)),
         ("line deviation, max", format!("{:.3} mm", mm(v.line_deviation_max_m))),
@@ -309,9 +310,12 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         ("touching, p50", format!("{:.0} %", 100.0 * p.touching_p50)),
         ("violations", found),
         ("  against", against),
-    ]
-    .map(|(name, value)| [name.to_owned(), value])
-    .into()
+    ];
+    // Without a surface nothing is known of what is swept, pressed and faced.
+    let of_surface =
+        |name: &str| !["line deviation, max", "violations", "  against"].contains(&name);
+    let known = rows.into_iter().filter(|(name, _)| a.surface_points > 0 || !of_surface(name));
+    known.map(|(name, value)| [name.to_owned(), value]).collect()
 }
 
 /// How many violations were found, and for how many links that is a guess.
