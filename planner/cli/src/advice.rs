@@ -4,7 +4,7 @@
 use std::error::Error;
 
 use nullsweep_collision::{CollisionError, MeshError};
-use nullsweep_ipc_types::Mode;
+use nullsweep_ipc_types::{Mode, Reason};
 use nullsweep_planner::link::posture::PostureError;
 use nullsweep_planner::link::publish::PublishError;
 use nullsweep_planner::link::replan::ReplanError;
@@ -149,6 +149,9 @@ fn publish(error: &PublishError) -> Option<String> {
         PublishError::Lost(_) => {
             "see the executor's last lines for why; it starts no plan from before its own start, so \
              publish again, or `planner replan`, once `executor ctl status` answers"
+        }
+        PublishError::Rejected(event) if event.reason == Reason::NotReady.wire() => {
+            "is the endpoint running? `executor ctl status` tells more"
         }
         PublishError::Plan(error) => return plan(error),
         _ => return None,
