@@ -224,11 +224,23 @@ fn collision(error: &CollisionError) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use anyhow::Context;
+    use bytemuck::Zeroable as _;
+    use nullsweep_ipc_types::PlanEvent;
 
     use super::*;
 
     fn of(error: impl Into<anyhow::Error>) -> String {
         advice(&error.into()).expect("advice")
+    }
+
+    #[test]
+    fn a_plan_that_comes_too_early_says_what_may_be_missing() {
+        let event = |reason: Reason| {
+            let event = PlanEvent { reason: reason.wire(), ..PlanEvent::zeroed() };
+            PublishError::Rejected(Box::new(event))
+        };
+        assert!(of(event(Reason::NotReady)).contains("endpoint"));
+        assert_eq!(advice(&event(Reason::Start).into()), None);
     }
 
     #[test]

@@ -73,6 +73,34 @@ fn an_output_that_cannot_be_written_is_told_before_the_work() {
 }
 
 #[test]
+fn a_note_is_told_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("cell.toml"), "[scene]\nsupport_height = 0.7\n")
+        .expect("written");
+    let (code, _, said) = run(folder.path(), "cell check");
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(said.matches("home is taken to be").count(), 1, "{said}");
+}
+
+#[test]
+fn a_scene_file_is_taken_beside_a_cell_that_says_which_way_is_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let points: String = (0..900)
+        .map(|i| format!("{} {} 0\n", 0.02 * f64::from(i / 30), 0.02 * f64::from(i % 30)))
+        .collect();
+    std::fs::write(folder.path().join("scan.xyz"), points).expect("written");
+    let (code, _, said) = run(folder.path(), "scene scan.xyz --out scene.toml");
+    assert_eq!(code, Some(0), "{said}");
+    std::fs::write(folder.path().join("cell.toml"), "[scene]\nup = [0, 0, 1]\n").expect("written");
+    let (code, _, said) = run(folder.path(), "view scene.toml --no-open --out view.html");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("scene.toml says how its scans stand: --up and --scale"), "{said}");
+    let pose = "view scene.toml --no-open --sensor-pose 0,0,1,0,0,0,1";
+    let (code, _, said) = run(folder.path(), pose);
+    assert_eq!(code, Some(2), "{said}");
+}
+
+#[test]
 fn a_full_disk_is_told() {
     let folder = tempfile::tempdir().expect("a folder");
     long_plan(&folder.path().join("plan.json"));
