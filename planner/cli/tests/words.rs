@@ -85,8 +85,8 @@ fn a_note_is_told_once() {
 #[test]
 fn a_scene_file_is_taken_beside_a_cell_that_says_which_way_is_up() {
     let folder = tempfile::tempdir().expect("a folder");
-    let points: String = (0..900)
-        .map(|i| format!("{} {} 0\n", 0.02 * f64::from(i / 30), 0.02 * f64::from(i % 30)))
+    let points: String = (0..3600)
+        .map(|i| format!("{} {} 0\n", 0.01 * f64::from(i / 60), 0.01 * f64::from(i % 60)))
         .collect();
     std::fs::write(folder.path().join("scan.xyz"), points).expect("written");
     let (code, _, said) = run(folder.path(), "scene scan.xyz --out scene.toml");
