@@ -3,26 +3,11 @@
 //! Everything is evaluated in closed form from absolute plan time, so nothing drifts, and both
 //! ends of a segment are hit bit for bit.
 
-use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::Interpolation;
+pub use nullsweep_recording::PlanKnot;
 
 use crate::total::greater;
 use crate::{JointVector, MAX_DOF};
-
-/// A knot as the loop reads it.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct PlanKnot {
-    /// Time since the plan's start, a whole number, exact to 2^53. \[ns\]
-    pub time: f64,
-    /// Joint positions. \[rad\] or \[m\]
-    pub q: JointVector,
-    /// Joint velocities, used by cubic segments. \[rad/s\] or \[m/s\]
-    pub v: JointVector,
-    /// The steepest change of the plan-time rate that keeps every joint within the stop
-    /// acceleration from this knot to a cycle past the next one. \[1/s\]
-    pub ramp: f64,
-}
 
 /// Positions and velocities at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::{Fault, Mode};
+use nullsweep_recording::MeasuredRecord;
 
 use super::exchange::{Measured, Refused};
 use super::state::{REMEMBERED, State, small};
@@ -39,17 +40,6 @@ pub struct Checkpoint {
     rates: [f64; 3],
     remembered: [JointVector; REMEMBERED],
     remembered_v: [JointVector; REMEMBERED],
-}
-
-/// A [`Measured`] as plain bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct MeasuredRecord {
-    stamp_ns: u64,
-    setpoint_sequence: u64,
-    q: JointVector,
-    joint_count: u32,
-    status: u32,
 }
 
 impl From<&Measured> for MeasuredRecord {

@@ -30,7 +30,7 @@ mod watch;
 use crate::guard::Guard;
 use state::REMEMBERED;
 
-pub use checkpoint::{Checkpoint, MeasuredRecord};
+pub use checkpoint::Checkpoint;
 pub use exchange::{
     Ask, EVENTS, Event, HELD_MOVED, Input, Measured, Order, Output, Refused, Reply, Snapshot,
     Target,

@@ -5,9 +5,10 @@ use std::io::Write as _;
 use std::sync::Arc;
 
 use nullsweep_ipc_types::JoinRule;
+use nullsweep_recording::{MAGIC, PlanRecord, Tag, put, take};
 use proptest::prelude::*;
 
-use super::format::{CycleRecord, GuardRecord, MAGIC, PlanRecord, Tag, put, take};
+use super::format::{self, GuardRecord};
 use super::replay;
 use crate::cycle::{Ask, Checkpoint, Input, Measured, Order, State, step};
 use crate::guard::tests::pr2;
@@ -65,8 +66,9 @@ fn sound() -> Vec<u8> {
             offer: (cycle == 5).then(|| Arc::clone(&offer)),
             missed: 0,
         };
-        let mut record = CycleRecord::of(&input, now_ns);
-        record.target = step(&mut state, input, now_ns, &guard).setpoint.as_ref().into();
+        let mut record = format::cycle(&input, now_ns);
+        let setpoint = step(&mut state, input, now_ns, &guard).setpoint;
+        record.target = format::target(setpoint.as_ref());
         cycles.push(record);
     }
     for record in &cycles {

@@ -1,69 +1,14 @@
-//! The recording's format: a row of sealed records.
-//!
-//! Each record is a tag, a length, a payload of plain little-endian bytes and an xxh3 checksum of
-//! them. A process that dies leaves at worst a torn last record, which a reader takes as the end.
+//! What the loop knows as the records of a recording, and back.
 
 use bytemuck::{Pod, Zeroable};
 use nullsweep_ipc_types::{Interpolation, PlanId};
+use nullsweep_recording::{CycleRecord, MeasuredRecord, PlanKnot, PlanRecord, TargetRecord};
 use nullsweep_robot::JointLimits;
-use xxhash_rust::xxh3::xxh3_64;
 
+use crate::MAX_DOF;
 use crate::admit::{Join, Shape, ValidPlan};
-use crate::cycle::{Ask, Input, Measured, MeasuredRecord, Order, Target};
+use crate::cycle::{Ask, Input, Measured, Order, Target};
 use crate::guard::Guard;
-use crate::interpolate::PlanKnot;
-use crate::{JointVector, MAX_DOF};
-
-/// The first bytes of a recording; the digit is the version.
-pub(crate) const MAGIC: &[u8; 8] = b"NSWREC6\n";
-
-/// What a record holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub(crate) enum Tag {
-    /// A [`GuardRecord`].
-    Guard = 1,
-    /// A [`crate::cycle::Checkpoint`].
-    Checkpoint = 2,
-    /// A [`PlanRecord`] and its knots.
-    Plan = 3,
-    /// A [`CycleRecord`].
-    Cycle = 4,
-}
-
-/// Appends a sealed record.
-pub(crate) fn put(to: &mut Vec<u8>, tag: Tag, parts: &[&[u8]]) {
-    let start = to.len();
-    let length: usize = parts.iter().map(|p| p.len()).sum();
-    to.extend_from_slice(&(tag as u32).to_le_bytes());
-    to.extend_from_slice(&(length as u32).to_le_bytes());
-    for part in parts {
-        to.extend_from_slice(part);
-    }
-    let seal = xxh3_64(&to[start..]);
-    to.extend_from_slice(&seal.to_le_bytes());
-}
-
-/// Takes the record at the head of `from`; `None` at a torn or false one.
-pub(crate) fn take<'a>(from: &mut &'a [u8]) -> Option<(Tag, &'a [u8])> {
-    let bytes = *from;
-    let head = bytes.get(..8)?;
-    let number = |b: &[u8]| b.try_into().map(u32::from_le_bytes).ok();
-    let tag = match number(&head[..4])? {
-        1 => Tag::Guard,
-        2 => Tag::Checkpoint,
-        3 => Tag::Plan,
-        4 => Tag::Cycle,
-        _ => return None,
-    };
-    let end = 8 + number(&head[4..])? as usize;
-    let seal = bytes.get(end..end.checked_add(8)?)?;
-    if xxh3_64(&bytes[..end]).to_le_bytes() != seal {
-        return None;
-    }
-    *from = &bytes[end + 8..];
-    Some((tag, &bytes[8..end]))
-}
 
 /// A [`Guard`] as plain bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -144,22 +89,6 @@ impl From<&GuardRecord> for Guard {
     }
 }
 
-/// A [`ValidPlan`] without its knots.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct PlanRecord {
-    id: PlanId,
-    join_plan: PlanId,
-    join_knot: u64,
-    /// 0 stop, 1 after, 2 knot.
-    join: u32,
-    interpolation: u32,
-    corners: u32,
-    verified: u32,
-    /// See [`ValidPlan::waited`].
-    waited: f64,
-}
-
 impl From<&ValidPlan> for PlanRecord {
     fn from(plan: &ValidPlan) -> Self {
         let (join, join_plan, join_knot) = match plan.join() {
@@ -194,105 +123,65 @@ pub(crate) fn plan(payload: &[u8]) -> Option<ValidPlan> {
     Some(ValidPlan::new(head.id, join, shape, head.verified != 0, knots, head.waited))
 }
 
-/// The state after a cycle was handed over as a checkpoint.
-pub(crate) const CHECKPOINT: u32 = 1;
-/// Cycles before one were lost on the way to the worker. No such one is in a recording.
-pub(crate) const HOLE: u32 = 2;
-
-/// One cycle: what [`crate::cycle::step`] got, and the setpoint that it gave.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct CycleRecord {
-    pub now_ns: u64,
-    measured: MeasuredRecord,
-    pub offer: PlanId,
-    ticket: u64,
-    scale: f64,
-    /// 0 for none, else 1 + the order's place in [`Order`].
-    order: u32,
-    has_measured: u32,
-    missed: u32,
-    /// Bits of [`CHECKPOINT`] and [`HOLE`].
-    pub checkpoint: u32,
-    pub target: TargetRecord,
+/// A setpoint, if there is one.
+pub(crate) fn target(target: Option<&Target>) -> TargetRecord {
+    target.map_or_else(TargetRecord::zeroed, |t| TargetRecord {
+        sequence: t.sequence,
+        q: t.q,
+        v: t.v,
+        plan: t.plan,
+        knot: t.knot,
+        mode: t.mode.wire(),
+        disable: u32::from(t.disable),
+        reserved: 0,
+    })
 }
 
-/// A setpoint as plain bytes; sequence 0 for none.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct TargetRecord {
-    pub sequence: u64,
-    pub q: JointVector,
-    pub v: JointVector,
-    pub plan: PlanId,
-    pub knot: u32,
-    pub mode: u32,
-    pub disable: u32,
-    reserved: u32,
-}
-
-impl From<Option<&Target>> for TargetRecord {
-    fn from(target: Option<&Target>) -> Self {
-        target.map_or_else(Self::zeroed, |t| Self {
-            sequence: t.sequence,
-            q: t.q,
-            v: t.v,
-            plan: t.plan,
-            knot: t.knot,
-            mode: t.mode.wire(),
-            disable: u32::from(t.disable),
-            reserved: 0,
-        })
+/// What a cycle gets; its setpoint comes later.
+pub(crate) fn cycle(input: &Input, now_ns: u64) -> CycleRecord {
+    let (order, scale) = match input.ask.map(|a| a.order) {
+        None => (0, 0.0),
+        Some(Order::Status) => (1, 0.0),
+        Some(Order::Pause) => (2, 0.0),
+        Some(Order::Resume) => (3, 0.0),
+        Some(Order::Stop) => (4, 0.0),
+        Some(Order::StopAndDisable) => (5, 0.0),
+        Some(Order::Speed(scale)) => (6, scale),
+        Some(Order::Reset) => (7, 0.0),
+        Some(Order::Shutdown) => (8, 0.0),
+    };
+    CycleRecord {
+        now_ns,
+        measured: input.measured.as_ref().map_or_else(MeasuredRecord::zeroed, Into::into),
+        offer: input.offer.as_ref().map_or(PlanId::NONE, |p| p.id()),
+        ticket: input.ask.map_or(0, |a| a.ticket),
+        scale,
+        order,
+        has_measured: u32::from(input.measured.is_some()),
+        missed: input.missed,
+        checkpoint: 0,
+        target: TargetRecord::zeroed(),
     }
 }
 
-impl CycleRecord {
-    /// What a cycle gets; its setpoint comes later.
-    pub(crate) fn of(input: &Input, now_ns: u64) -> Self {
-        let (order, scale) = match input.ask.map(|a| a.order) {
-            None => (0, 0.0),
-            Some(Order::Status) => (1, 0.0),
-            Some(Order::Pause) => (2, 0.0),
-            Some(Order::Resume) => (3, 0.0),
-            Some(Order::Stop) => (4, 0.0),
-            Some(Order::StopAndDisable) => (5, 0.0),
-            Some(Order::Speed(scale)) => (6, scale),
-            Some(Order::Reset) => (7, 0.0),
-            Some(Order::Shutdown) => (8, 0.0),
-        };
-        Self {
-            now_ns,
-            measured: input.measured.as_ref().map_or_else(MeasuredRecord::zeroed, Into::into),
-            offer: input.offer.as_ref().map_or(PlanId::NONE, |p| p.id()),
-            ticket: input.ask.map_or(0, |a| a.ticket),
-            scale,
-            order,
-            has_measured: u32::from(input.measured.is_some()),
-            missed: input.missed,
-            checkpoint: 0,
-            target: TargetRecord::zeroed(),
-        }
-    }
-
-    /// What the cycle got, but for its plan. `None` where the bytes are no input.
-    pub(crate) fn input(&self) -> Option<Input> {
-        let order = match self.order {
-            0 => None,
-            1 => Some(Order::Status),
-            2 => Some(Order::Pause),
-            3 => Some(Order::Resume),
-            4 => Some(Order::Stop),
-            5 => Some(Order::StopAndDisable),
-            6 => Some(Order::Speed(self.scale)),
-            7 => Some(Order::Reset),
-            8 => Some(Order::Shutdown),
-            _ => return None,
-        };
-        Some(Input {
-            measured: (self.has_measured != 0).then(|| Measured::from(&self.measured)),
-            ask: order.map(|order| Ask { ticket: self.ticket, order }),
-            offer: None,
-            missed: self.missed,
-        })
-    }
+/// What a cycle got, but for its plan. `None` where the bytes are no input.
+pub(crate) fn input(record: &CycleRecord) -> Option<Input> {
+    let order = match record.order {
+        0 => None,
+        1 => Some(Order::Status),
+        2 => Some(Order::Pause),
+        3 => Some(Order::Resume),
+        4 => Some(Order::Stop),
+        5 => Some(Order::StopAndDisable),
+        6 => Some(Order::Speed(record.scale)),
+        7 => Some(Order::Reset),
+        8 => Some(Order::Shutdown),
+        _ => return None,
+    };
+    Some(Input {
+        measured: (record.has_measured != 0).then(|| Measured::from(&record.measured)),
+        ask: order.map(|order| Ask { ticket: record.ticket, order }),
+        offer: None,
+        missed: record.missed,
+    })
 }

@@ -19,7 +19,8 @@ use crate::admit::ValidPlan;
 use crate::cycle::{Checkpoint, Input, State, Target};
 use crate::guard::Guard;
 use crate::sync::{AtomicBool, AtomicU64, Consumer, Producer, RingBuffer};
-use format::{CHECKPOINT, CycleRecord, GuardRecord, HOLE, MAGIC, PlanRecord, Tag, put};
+use format::GuardRecord;
+use nullsweep_recording::{CHECKPOINT, CycleRecord, HOLE, MAGIC, PlanRecord, Tag, put};
 
 pub use replay::{ReplayError, Replayed, replay};
 
@@ -50,12 +51,12 @@ struct Shared {
 impl Tape {
     /// Before a cycle: notes what it gets.
     pub(crate) fn input(input: &Input, now_ns: u64) -> CycleRecord {
-        CycleRecord::of(input, now_ns)
+        format::cycle(input, now_ns)
     }
 
     /// After it: adds what it gave and hands it on, with the loop's memory where one is wanted.
     pub(crate) fn push(&mut self, mut record: CycleRecord, target: Option<&Target>, state: &State) {
-        record.target = target.into();
+        record.target = format::target(target);
         // Asked first: a checkpoint whose cycle is lost would be in the way of all later ones.
         if self.cycles.is_full() {
             self.hole = true;

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nullsweep_ipc_types::{EventKind, PlanId};
+use nullsweep_recording::{CycleRecord, MAGIC, Tag, take};
 
-use super::format::{CycleRecord, GuardRecord, MAGIC, Tag, TargetRecord, plan, take};
+use super::format::{self, GuardRecord};
 use crate::cycle::{Checkpoint, Event, State, step};
 use crate::guard::Guard;
 
@@ -95,21 +96,21 @@ pub fn replay(path: &Path) -> Result<Replayed, ReplayError> {
     while let Some((tag, payload)) = take(&mut rest) {
         match tag {
             Tag::Plan => {
-                let plan = plan(payload).ok_or_else(no_recording)?;
+                let plan = format::plan(payload).ok_or_else(no_recording)?;
                 plans.insert(plan.id(), Arc::new(plan));
             }
             Tag::Cycle => {
                 let record: CycleRecord = read(payload).ok_or_else(no_recording)?;
                 replayed.cycles += 1;
                 let cycle = replayed.cycles;
-                let mut input = record.input().ok_or_else(no_recording)?;
+                let mut input = format::input(&record).ok_or_else(no_recording)?;
                 if record.offer.is_some() {
                     let plan = plans.remove(&record.offer);
                     let missing = ReplayError::MissingPlan { cycle, plan: record.offer };
                     input.offer = Some(plan.ok_or(missing)?);
                 }
                 let out = step(&mut state, input, record.now_ns, &guard);
-                let target = TargetRecord::from(out.setpoint.as_ref());
+                let target = format::target(out.setpoint.as_ref());
                 // Bytes, not values: a NaN or a negative zero must be the same one.
                 if bytemuck::bytes_of(&target) != bytemuck::bytes_of(&record.target) {
                     let sequence = record.target.sequence;

@@ -2,8 +2,8 @@
 
 use bytemuck::Zeroable;
 use nullsweep_ipc_types::{EventKind, JoinRule, JointStates, status};
+use nullsweep_recording::{CycleRecord, MAGIC, Tag, put, take};
 
-use super::format::{CycleRecord, MAGIC, Tag, put, take};
 use super::{Recorder, ReplayError, replay};
 use crate::guard::tests::pr2;
 use crate::rt::Wake;

@@ -4,7 +4,7 @@
 use std::error::Error;
 
 use nullsweep_collision::{CollisionError, MeshError};
-use nullsweep_ipc_types::Mode;
+use nullsweep_ipc_types::{Mode, Reason};
 use nullsweep_planner::link::posture::PostureError;
 use nullsweep_planner::link::publish::PublishError;
 use nullsweep_planner::link::replan::ReplanError;
@@ -150,6 +150,9 @@ fn publish(error: &PublishError) -> Option<String> {
             "see the executor's last lines for why; it starts no plan from before its own start, so \
              publish again, or `planner replan`, once `executor ctl status` answers"
         }
+        PublishError::Rejected(event) if event.reason == Reason::NotReady.wire() => {
+            "is the endpoint running? `executor ctl status` tells more"
+        }
         PublishError::Plan(error) => return plan(error),
         _ => return None,
     };
@@ -221,11 +224,23 @@ fn collision(error: &CollisionError) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use anyhow::Context;
+    use bytemuck::Zeroable as _;
+    use nullsweep_ipc_types::PlanEvent;
 
     use super::*;
 
     fn of(error: impl Into<anyhow::Error>) -> String {
         advice(&error.into()).expect("advice")
+    }
+
+    #[test]
+    fn a_plan_that_comes_too_early_says_what_may_be_missing() {
+        let event = |reason: Reason| {
+            let event = PlanEvent { reason: reason.wire(), ..PlanEvent::zeroed() };
+            PublishError::Rejected(Box::new(event))
+        };
+        assert!(of(event(Reason::NotReady)).contains("endpoint"));
+        assert_eq!(advice(&event(Reason::Start).into()), None);
     }
 
     #[test]

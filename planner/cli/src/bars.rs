@@ -8,11 +8,13 @@ use nullsweep_planner::progress::Progress;
 /// Shows each stage's progress on standard error, if that is a terminal.
 pub(super) struct Bars {
     bar: Mutex<ProgressBar>,
+    /// Notes that were told.
+    told: Mutex<Vec<String>>,
 }
 
 impl Bars {
     pub(super) fn new() -> Self {
-        Self { bar: Mutex::new(ProgressBar::hidden()) }
+        Self { bar: Mutex::new(ProgressBar::hidden()), told: Mutex::default() }
     }
 
     pub(super) fn clear(&self) {
@@ -47,7 +49,14 @@ impl Progress for Bars {
         self.with(|bar| bar.inc(1));
     }
 
+    /// A note is told once.
     fn note(&self, text: &str) {
+        if let Ok(mut told) = self.told.lock() {
+            if told.iter().any(|one| one == text) {
+                return;
+            }
+            told.push(text.to_owned());
+        }
         self.with(|bar| bar.suspend(|| eprintln!("note: {text}")));
     }
 }

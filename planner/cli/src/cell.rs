@@ -14,6 +14,7 @@ use nullsweep_robot::{Arm, ArmSpec, JointKind, JointVector, MAX_DOF, Robot, Tool
 use crate::bars::Bars;
 use crate::exit::{FAILED, OK, Usage};
 use crate::numbers::Held;
+use crate::output::{say, say_on};
 use crate::posture_arg::PostureArg;
 use crate::robot::{RobotArgs, tool_file};
 use crate::site::SiteArgs;
@@ -62,7 +63,7 @@ pub(super) fn run(args: &CellArgs) -> anyhow::Result<u8> {
             let robot = args.robot.robot()?;
             let arm = args.arm(&robot, &args.robot.spec())?;
             let found = args.look(&robot, &arm)?;
-            print!("{}", found.text);
+            say_on!("{}", found.text);
             Ok(if found.sound { OK } else { FAILED })
         }
     }
@@ -82,8 +83,8 @@ fn init(args: &InitArgs) -> anyhow::Result<u8> {
     let found = args.check.look(&robot, &arm)?;
     let text = args.check.file(&robot, &arm, found.home, out.parent().unwrap_or(Path::new("")))?;
     std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
-    print!("{}", found.text);
-    println!("cell: {}", out.display());
+    say_on!("{}", found.text);
+    say!("cell: {}", out.display());
     Ok(OK)
 }
 

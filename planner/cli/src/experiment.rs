@@ -18,6 +18,7 @@ use crate::choices::ObjectArg;
 use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::not_negative;
+use crate::output::{say_on, writable};
 use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
@@ -58,6 +59,12 @@ pub(super) struct ExperimentArgs {
 }
 
 pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
+    if let Some(directory) = &args.out {
+        std::fs::create_dir_all(directory)
+            .with_context(|| format!("cannot make {}", directory.display()))?;
+        let name = name(args.paper_object.into());
+        writable(&directory.join(format!("{name}.md")))?;
+    }
     let bars = Bars::new();
     let robot = Robot::pr2();
     bars.stage("scan", None);
@@ -111,8 +118,6 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
             let path = directory.join(file);
             std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
         };
-        std::fs::create_dir_all(directory)
-            .with_context(|| format!("cannot make {}", directory.display()))?;
         let name = name(args.paper_object.into());
         write(&format!("{name}.md"), &tables)?;
         write(&format!("{name}.csv"), &experiment::csv(&report))?;
@@ -124,7 +129,7 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
     if args.json {
         write_json(&report, std::path::Path::new("-"))?;
     } else {
-        print!("{tables}");
+        say_on!("{tables}");
     }
     Ok(OK)
 }

@@ -12,7 +12,7 @@ use nullsweep_robot::{JointVector, Tool};
 use crate::bars::Bars;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::numbers::{Held, Place};
-use crate::output::writable;
+use crate::output::{say, say_on, writable};
 use crate::posture::is_known;
 use crate::posture_arg::PostureArg;
 use crate::robot::{RobotArgs, tool_file};
@@ -81,15 +81,15 @@ pub(super) fn run(args: &GotoArgs) -> anyhow::Result<u8> {
         found => found?,
     };
     let Some(found) = found else {
-        println!("the arm is there already");
+        say!("the arm is there already");
         return Ok(OK);
     };
     let now = resting(args.site.site(), &arm);
-    print!("{}{}", outlook(&found.plan, Some(&arm), now.as_ref()), found.room());
+    say_on!("{}{}", outlook(&found.plan, Some(&arm), now.as_ref()), found.room());
     let found = found.plan;
     if let Some(out) = &args.out {
         found.write(out)?;
-        println!("plan: {}", out.display());
+        say!("plan: {}", out.display());
         return Ok(OK);
     }
     args.send.confirm()?;

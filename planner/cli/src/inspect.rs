@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::exit::OK;
 use crate::json::write_json;
+use crate::output::say_on;
 use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
@@ -57,7 +58,7 @@ pub(super) fn run(args: &InspectArgs) -> anyhow::Result<u8> {
     let summary = summarise(&plan);
     match &args.json {
         Some(path) => write_json(&summary, path)?,
-        None => print!("{}", tables(&summary)),
+        None => say_on!("{}", tables(&summary)),
     }
     Ok(OK)
 }

@@ -1,6 +1,8 @@
-//! Files that a command is to write: whether that goes is known before the work.
+//! What a command writes: files, of which it is known before the work whether that goes, and words.
 
+use std::fmt::Arguments;
 use std::fs::OpenOptions;
+use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context;
@@ -22,6 +24,38 @@ pub(super) fn writable(path: &Path) -> anyhow::Result<()> {
     }
     Ok(())
 }
+
+/// Writes to standard output.
+///
+/// # Errors
+/// Where it takes no more, as a full disk does.
+pub(super) fn write_out(words: Arguments<'_>) -> anyhow::Result<()> {
+    std::io::stdout().lock().write_fmt(words).context("cannot write to standard output")
+}
+
+/// Says a line on standard output; a command fails that cannot.
+macro_rules! say {
+    ($($words:tt)*) => {
+        $crate::output::write_out(format_args!("{}\n", format_args!($($words)*)))?
+    };
+}
+
+/// The same without the end of a line.
+macro_rules! say_on {
+    ($($words:tt)*) => {
+        $crate::output::write_out(format_args!($($words)*))?
+    };
+}
+
+/// Says a line on standard output of what happens while an arm moves, or of what is done already: what
+/// cannot be said changes nothing.
+macro_rules! tell {
+    ($($words:tt)*) => {{
+        let _ = $crate::output::write_out(format_args!("{}\n", format_args!($($words)*)));
+    }};
+}
+
+pub(super) use {say, say_on, tell};
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::Args;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use nullsweep_planner::progress::Progress;
@@ -63,23 +63,30 @@ pub(super) fn read_scans(
     if let [path] = scans
         && path.extension().is_some_and(|extension| extension == "toml")
     {
-        // Some of it may be a cell's, for scans that have no scene file.
-        if args.up.is_some() || !args.sensor_pose.is_empty() || args.scale != 1.0 {
+        ensure!(
+            args.sensor_pose.is_empty(),
+            Usage(format!(
+                "{}: a scene file says how its scans stand: leave out --sensor-pose",
+                path.display()
+            ))
+        );
+        // A cell file may say it of all other scans.
+        if args.up.is_some() || args.scale != 1.0 {
             bars.note(&format!(
-                "{} says how its scans stand: --up, --sensor-pose and --scale are not heeded",
+                "{} says how its scans stand: --up and --scale are not heeded",
                 path.display()
             ));
         }
         return SceneFile::read(path);
     }
-    if !args.sensor_pose.is_empty() && args.sensor_pose.len() != scans.len() {
-        return Err(Usage(format!(
-            "{} scans but {} sensor poses: give one --sensor-pose for each scan, in their order",
-            scans.len(),
-            args.sensor_pose.len()
+    ensure!(
+        args.sensor_pose.is_empty() || args.sensor_pose.len() == scans.len(),
+        Usage(format!(
+            "--sensor-pose is there {} times for {} scans: one for each, in their order",
+            args.sensor_pose.len(),
+            scans.len()
         ))
-        .into());
-    }
+    );
     let options = ReadOptions { scale: args.scale, seed, ..ReadOptions::default() };
     let mut files = Vec::with_capacity(scans.len());
     for path in scans {

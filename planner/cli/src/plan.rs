@@ -24,7 +24,7 @@ use crate::choices::{CostArg, MethodArg, ProfileArg};
 use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::{Held, Place, finite, not_negative, percent, positive, velocity};
-use crate::output::writable;
+use crate::output::{say, writable};
 use crate::picture::{Sitter, picture};
 use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
@@ -254,6 +254,7 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
             scene: Some(scene),
             verification: Some(&figures.verification),
             left_out: &figures.left_out,
+            flights: &[],
             tables: vec![figures_table(figures)],
             lines: vec![report::LineSet {
                 name: "graph".into(),
@@ -268,12 +269,12 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
     }
     let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
     if !to_stdout {
-        println!("{}", table(figures));
+        say!("{}", table(figures));
     }
     if code == OK && !to_stdout {
-        println!("plan: {}", args.out.display());
+        say!("plan: {}", args.out.display());
         if let Some(path) = &args.report {
-            println!("report: {}", path.display());
+            say!("report: {}", path.display());
         }
     }
     Ok(code)
@@ -290,8 +291,9 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         n => format!("{n} of unseen space"),
     };
     let found = violations(v.violations.len(), &a.guessed_links);
+    let obstacles = if a.obstacles == 1 { "obstacle" } else { "obstacles" };
     let against = format!(
-        "{} points of the surface, {} others, {} raw, {unseen}, {} obstacles{}",
+        "{} points of the surface, {} others, {} raw, {unseen}, {} {obstacles}{}",
         a.surface_points,
         a.other_points,
         a.raw_points,
@@ -299,7 +301,7 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         a.but_for()
     );
     let distance = (mm(v.scan_distance_p95_m), mm(v.scan_distance_max_m));
-    [
+    let rows = [
         ("coverage of reachable points", percent(v.coverage_reachable)),
         ("coverage of all points", percent(v.coverage_all)),
         ("line deviation, max", format!("{:.3} mm", mm(v.line_deviation_max_m))),
@@ -312,9 +314,12 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         ("touching, p50", format!("{:.0} %", 100.0 * p.touching_p50)),
         ("violations", found),
         ("  against", against),
-    ]
-    .map(|(name, value)| [name.to_owned(), value])
-    .into()
+    ];
+    // Without a surface nothing is known of what is swept, pressed and faced.
+    let of_surface =
+        |name: &str| !["line deviation, max", "violations", "  against"].contains(&name);
+    let known = rows.into_iter().filter(|(name, _)| a.surface_points > 0 || !of_surface(name));
+    known.map(|(name, value)| [name.to_owned(), value]).collect()
 }
 
 /// How many violations were found, and for how many links that is a guess.

@@ -10,6 +10,7 @@ use nullsweep_robot::Arm;
 use crate::bars::Bars;
 use crate::choices::JoinArg;
 use crate::exit::{OK, Usage, VIOLATIONS};
+use crate::output::{say, say_on};
 use crate::robot::RobotArgs;
 use crate::send::{SendArgs, outlook, resting};
 use crate::site::SiteArgs;
@@ -72,12 +73,12 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     };
     let now = arm.as_ref().filter(|_| join == Join::Stop).and_then(|arm| resting(site, arm));
     if let Some(first) = &first {
-        println!("to the plan's start:");
-        print!("{}{}", outlook(&first.plan, arm.as_ref(), now.as_ref()), first.room());
+        say!("to the plan's start:");
+        say_on!("{}{}", outlook(&first.plan, arm.as_ref(), now.as_ref()), first.room());
     }
-    println!("{}:", args.plan.display());
+    say!("{}:", args.plan.display());
     let now = now.filter(|_| first.is_none());
-    print!("{}", outlook(&plan, arm.as_ref(), now.as_ref()));
+    say_on!("{}", outlook(&plan, arm.as_ref(), now.as_ref()));
     args.send.confirm()?;
     if let Some(first) = &first {
         args.send.send((&first.plan, None), arm.as_ref(), site, Join::Stop, true)?;

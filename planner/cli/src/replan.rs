@@ -12,6 +12,7 @@ use nullsweep_planner::plan::Plan;
 
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::numbers::seconds;
+use crate::output::{say, tell};
 use crate::plan::{PlanArgs, make};
 use crate::site::SiteArgs;
 
@@ -53,13 +54,11 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
     let mut from = |start: Start| {
         let (knot, held) = match start {
             Start::Knot(knot) => {
-                println!("planning from knot {knot} on, at most {} s", args.lead.as_secs_f64());
+                tell!("planning from knot {knot} on, at most {} s", args.lead.as_secs_f64());
                 (knot, None)
             }
             Start::Held { knot, at } => {
-                println!(
-                    "the knot has passed: the arm holds past knot {knot}, planning from there"
-                );
+                tell!("the knot has passed: the arm holds past knot {knot}, planning from there");
                 (knot, Some(at))
             }
         };
@@ -69,10 +68,10 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
         if code == VIOLATIONS { Err("it breaks a rule".to_owned()) } else { Ok(plan) }
     };
     let done = replan(site, &running, args.lead, patience, &mut from, &mut |event: &PlanEvent| {
-        println!("{}", describe(event));
+        tell!("{}", describe(event));
     });
     match done {
-        Ok(done) => println!("{done}"),
+        Ok(done) => say!("{done}"),
         Err(_) if code == VIOLATIONS => {}
         Err(error) => return Err(error.into()),
     }

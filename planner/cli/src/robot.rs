@@ -109,6 +109,15 @@ impl RobotArgs {
                 hard.join(", ")
             ));
         }
+        for posture in &self.posture {
+            let found = posture.joints().len();
+            if found != arm.dof() {
+                let (name, dof) = (posture.name(), arm.dof());
+                bars.note(&format!(
+                    "posture {name} has {found} joints, this arm has {dof}: it is none of it"
+                ));
+            }
+        }
         Ok(())
     }
 

@@ -11,6 +11,7 @@ use nullsweep_surface::room::Room;
 
 use crate::bars::Bars;
 use crate::exit::OK;
+use crate::output::{say, writable};
 use crate::placed::{Gravity, PlacedArgs, read_scans};
 use crate::room::{SEED, name};
 use crate::scene_file::SceneFile;
@@ -38,6 +39,9 @@ pub(super) struct SceneCommandArgs {
 
 pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
+    for out in args.out.iter().chain(&args.report) {
+        writable(out)?;
+    }
     bars.stage("scan", None);
     let found = read_scans(&args.placed, &args.scans, args.seed, Gravity::Found, &bars)?;
     let scan = &found.scan;
@@ -48,14 +52,14 @@ pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     bars.clear();
     let mut table = sheet(COLUMNS);
     table.add_rows(rows(&room));
-    println!("{table}");
+    say!("{table}");
     if let Some(path) = &args.out {
         SceneFile::of(path, &found, &room, seed)?.write(path)?;
-        println!("scene: {}", path.display());
+        say!("scene: {}", path.display());
     }
     if let Some(path) = &args.report {
         report::write(path, &picture(&args.scans, scan, &room))?;
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     Ok(OK)
 }

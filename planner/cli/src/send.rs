@@ -19,6 +19,7 @@ use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::Arm;
 
 use crate::numbers::seconds;
+use crate::output::tell;
 
 #[derive(Debug, Args)]
 pub(super) struct SendArgs {
@@ -190,7 +191,7 @@ impl Show {
 
 impl Watcher for Show {
     fn event(&mut self, event: &PlanEvent) {
-        self.bar.suspend(|| println!("{}", describe_for(event, &self.joints)));
+        self.bar.suspend(|| tell!("{}", describe_for(event, &self.joints)));
     }
 
     fn progress(&mut self, telemetry: &Telemetry) {

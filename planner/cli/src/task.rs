@@ -13,6 +13,7 @@ use crate::bars::Bars;
 use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::{finite, velocity};
+use crate::output::{say, writable};
 use crate::plan::violations;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
@@ -57,6 +58,9 @@ pub(super) struct TaskArgs {
 }
 
 pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
+    for out in [&args.out].into_iter().chain(&args.json) {
+        writable(out)?;
+    }
     let bars = Bars::new();
     let robot = args.robot.robot()?;
     args.robot.tell(&robot, &bars)?;
@@ -97,11 +101,11 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
         write_json(figures, path)?;
     }
     if !to_stdout {
-        println!("{}", table(figures));
+        say!("{}", table(figures));
     }
     let code = write_unless_broken(&outcome.plan, &outcome.verification.violations, &args.out)?;
     if code == OK && !to_stdout {
-        println!("plan: {}", args.out.display());
+        say!("plan: {}", args.out.display());
     }
     Ok(code)
 }

@@ -12,6 +12,7 @@ use nullsweep_planner::workcell::Scene;
 use crate::bars::Bars;
 use crate::exit::{OK, VIOLATIONS};
 use crate::json::write_json;
+use crate::output::{say, writable};
 use crate::plan::verified_rows;
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
@@ -48,6 +49,9 @@ pub(super) struct VerifyArgs {
 }
 
 pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
+    for out in args.out.iter().chain(&args.json) {
+        writable(out)?;
+    }
     let bars = Bars::new();
     let plan = Plan::read(&args.plan)?;
     let robot = args.robot.robot()?;
@@ -75,7 +79,7 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
         None => {
             let mut table = sheet(["figure", "value"]);
             table.add_rows(verified_rows(&found));
-            println!("{table}");
+            say!("{table}");
         }
     }
     if !found.violations.is_empty() {

@@ -8,29 +8,35 @@ use clap::Args;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::verify::{Given, Verification, verify};
+use nullsweep_recording::Recording;
 use nullsweep_report::{self as report, ReportData, Table};
-use nullsweep_robot::{Arm, Robot};
+use nullsweep_robot::{Arm, Robot, Tool};
 use nullsweep_surface::room::Room;
 
 use crate::bars::Bars;
 use crate::exit::{OK, Usage};
-use crate::picture::{Sitter, picture};
+use crate::output::{say, tell, writable};
+use crate::picture::{Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
 use crate::plan::verified_rows;
-use crate::robot::RobotArgs;
+use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
 use crate::scene_command;
 
 #[derive(Debug, Args)]
 pub(super) struct ViewArgs {
-    /// Plan files, in the order in which one takes over from another, and the scan files that they
-    /// were made for (or the scene file), given as they were to `plan`; scans or a scene file alone show
-    /// planes and objects.
+    /// Plan files, in the order in which one takes over from another; the scan files that they were
+    /// made for (or the scene file), given as they were to `plan`; flight recordings (`.nswrec`) of
+    /// when they ran. Scans or a scene file alone show planes and objects, a recording alone what was
+    /// commanded and measured.
     #[arg(required_unless_present = "demo")]
     files: Vec<PathBuf>,
     /// The plans were made for a simulated scan.
     #[arg(long, value_enum)]
     demo: Option<Demo>,
+    /// The tool of a recording without a plan, a TOML file; else a sponge of 0.10 × 0.07 m.
+    #[arg(long, value_name = "FILE")]
+    tool: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
@@ -51,15 +57,30 @@ pub(super) struct ViewArgs {
 
 pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
-    let (plans, scans): (Vec<&PathBuf>, Vec<&PathBuf>) =
+    let out = args.out.clone().unwrap_or_else(|| beside(args.files.first()));
+    writable(&out)?;
+    args.mcap.as_deref().map_or(Ok(()), writable)?;
+    let (plans, rest): (Vec<&PathBuf>, Vec<&PathBuf>) =
         args.files.iter().partition(|file| is_plan(file));
+    let (recordings, scans): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        rest.into_iter().partition(|file| has_extension(file, "nswrec"));
     let scans: Vec<PathBuf> = scans.into_iter().cloned().collect();
     if let (Some(_), Some(scan)) = (args.demo, scans.first()) {
         let why = "a scan beside --demo: the scene is one or the other";
         return Err(Usage(format!("{}: {why}", scan.display())).into());
     }
     let plans = plans.into_iter().map(|file| Plan::read(file)).collect::<Result<Vec<_>, _>>()?;
-    let data = if plans.is_empty() {
+    let data = if let (Some(recording), true) = (recordings.first(), plans.is_empty()) {
+        if recordings.len() > 1 || !scans.is_empty() || args.demo.is_some() {
+            return Err(Usage(format!(
+                "beside {} there is more to show: name the plan that ran too, its file says where the \
+                 robot stands",
+                recording.display()
+            ))
+            .into());
+        }
+        of_recording(args, recording, &bars)?
+    } else if plans.is_empty() {
         if args.demo.is_some() {
             let why = "--demo says what a plan was made for: name the plan's file";
             return Err(Usage(why.into()).into());
@@ -69,15 +90,15 @@ pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
         let room = Room::find(&found.scan, found.seed.unwrap_or(seed));
         scene_command::picture(&scans, &found.scan, &room)
     } else {
-        of_plans(args, &plans, &scans, &bars)?
+        of_plans(args, &plans, &scans, &recordings, &bars)?
     };
     bars.clear();
-    let out = args.out.clone().unwrap_or_else(|| beside(args.files.first()));
     report::write(&out, &data)?;
-    println!("page: {}", out.display());
+    say!("page: {}", out.display());
     if let Some(path) = &args.mcap {
-        report::write_log(path, &data)?;
-        println!("log: {}", path.display());
+        let there = || format!("cannot write {}", path.display());
+        report::write_log(path, &data).with_context(there)?;
+        say!("log: {}", path.display());
     }
     if !args.no_open {
         open(&out);
@@ -90,6 +111,7 @@ fn of_plans(
     args: &ViewArgs,
     plans: &[Plan],
     scans: &[PathBuf],
+    recordings: &[&PathBuf],
     bars: &Bars,
 ) -> anyhow::Result<ReportData> {
     let plan = &plans[plans.len() - 1];
@@ -111,6 +133,8 @@ fn of_plans(
             Some(verify(plan, given, &|| bars.tick())?)
         }
     };
+    let flights = recordings.iter().map(|file| flight(file, &arm, &plan.tool, plans));
+    let flights = flights.collect::<anyhow::Result<Vec<_>>>()?;
     bars.stage("picture", None);
     picture(Sitter {
         plans,
@@ -120,9 +144,26 @@ fn of_plans(
         scene: scene.as_ref(),
         verification: verification.as_ref(),
         left_out: &[],
+        flights: &flights,
         tables: verification.as_ref().map(table).into_iter().collect(),
         lines: Vec::new(),
     })
+}
+
+/// The page of a recording, of the arm that the cell or the flags name.
+fn of_recording(args: &ViewArgs, file: &Path, bars: &Bars) -> anyhow::Result<ReportData> {
+    let (robot, arm) = (args.robot.robot()?, args.robot.arm()?);
+    let tool = args.tool.as_deref().map_or(Ok(Tool::default()), tool_file)?;
+    let flight = flight(file, &arm, &tool, &[])?;
+    bars.stage("picture", None);
+    let collision = args.robot.collision();
+    recorded(file, flight, Posed { robot: &robot, arm: &arm, tool: &tool, collision: &collision })
+}
+
+/// What a recording says of plans.
+fn flight(file: &Path, arm: &Arm, tool: &Tool, plans: &[Plan]) -> anyhow::Result<Flight> {
+    let recording = Recording::read(file)?;
+    Flight::of(&recording, arm, tool, plans).with_context(|| file.display().to_string())
 }
 
 fn table(found: &Verification) -> Table {
@@ -152,8 +193,11 @@ fn arm(args: &ViewArgs, robot: &Robot, plan: &Plan) -> anyhow::Result<Arm> {
 
 /// Whether a file is a plan, by its name: no scan is JSON.
 fn is_plan(file: &Path) -> bool {
-    file.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("json") || e.eq_ignore_ascii_case("plan"))
+    has_extension(file, "json") || has_extension(file, "plan")
+}
+
+fn has_extension(file: &Path, wanted: &str) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted))
 }
 
 fn beside(file: Option<&PathBuf>) -> PathBuf {
@@ -165,7 +209,7 @@ fn open(page: &Path) {
     let has_screen = cfg!(target_os = "macos")
         || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
     if !has_screen {
-        println!("there is no screen here: open the page in a browser");
+        tell!("there is no screen here: open the page in a browser");
         return;
     }
     let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
@@ -177,6 +221,6 @@ fn open(page: &Path) {
         .spawn()
         .with_context(|| format!("{program} cannot be started"));
     if let Err(error) = started {
-        println!("{error:#}: open the page in a browser");
+        tell!("{error:#}: open the page in a browser");
     }
 }

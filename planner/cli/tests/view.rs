@@ -5,8 +5,11 @@ use std::process::{Command, Output};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use bytemuck::Zeroable as _;
 use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, UnitVector3, Vector3};
+use nullsweep_ipc_types::PlanId;
 use nullsweep_planner::plan::{Continues, Plan, PlanKnot, Profile};
+use nullsweep_recording::{self as recording, CycleRecord, MAGIC, MeasuredRecord, PlanRecord, Tag};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Tool};
 use serde_json::Value;
 
@@ -200,6 +203,142 @@ fn a_scan_shows_its_planes_and_objects() {
     assert_eq!(points, 3600, "every point is in one cloud");
     let groups = data["places"].as_array().unwrap();
     assert!(groups.iter().any(|g| !g["items"].as_array().unwrap().is_empty()));
+}
+
+/// A recording of a plan that runs at 100 Hz after a second in which the arm only holds: the endpoint
+/// answers a cycle later, and for half a second one joint is farther off than the others ever are.
+fn flight(folder: &Path, plan: &Plan, arm: &Arm) -> PathBuf {
+    let id = PlanId { epoch: 5, number: 1 };
+    let mut bytes = MAGIC.to_vec();
+    let head = PlanRecord { id, ..PlanRecord::zeroed() };
+    let knots: Vec<recording::PlanKnot> = plan
+        .knots
+        .iter()
+        .map(|k| recording::PlanKnot { time: k.time_ns as f64, q: k.q, v: k.v, ramp: 1.0 })
+        .collect();
+    let parts: [&[u8]; 2] = [bytemuck::bytes_of(&head), bytemuck::cast_slice(&knots)];
+    recording::put(&mut bytes, Tag::Plan, &parts);
+    let mut before = None;
+    for cycle in 1..=1271u64 {
+        let time = cycle.saturating_sub(100) * 10_000_000;
+        let k = plan.knots.partition_point(|k| k.time_ns <= time).clamp(1, plan.knots.len() - 1);
+        let from = plan.knots[k - 1].time_ns;
+        let share = (time - from) as f64 / (plan.knots[k].time_ns - from) as f64;
+        let mut record = CycleRecord::zeroed();
+        record.now_ns = 70_000_000_000 + cycle * 10_000_000;
+        record.target.sequence = cycle;
+        record.target.q = plan.curve(k).at(share.min(1.0));
+        if cycle >= 100 {
+            record.target.plan = id;
+            record.target.knot = (k - 1) as u32;
+        }
+        if let Some(answers) = before {
+            let mut q: JointVector = answers;
+            q[3] += if (500..550).contains(&cycle) { 0.02 } else { -0.001 };
+            if cycle == 520 {
+                q[3] += 0.0025;
+            }
+            // An endpoint that wraps what turns without end.
+            if arm.continuous().is(4) {
+                q[4] -= std::f64::consts::TAU;
+            }
+            record.has_measured = 1;
+            record.measured = MeasuredRecord {
+                stamp_ns: record.now_ns - 1000,
+                setpoint_sequence: cycle - 1,
+                q,
+                joint_count: arm.dof() as u32,
+                status: 1,
+            };
+        }
+        before = Some(record.target.q);
+        recording::put(&mut bytes, Tag::Cycle, &[bytemuck::bytes_of(&record)]);
+    }
+    let path = folder.join("flight-0.nswrec");
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+#[test]
+fn a_recording_is_shown_beside_its_plan_with_its_largest_deviation() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, arm) = plan(Side::Right, Profile::Acceleration);
+    let file = write(folder.path(), "plan.json", &plan);
+    let recording = flight(folder.path(), &plan, &arm);
+    let log = folder.path().join("seen.mcap");
+    let args = [&file, &recording].map(|path| path.to_str().unwrap());
+    let args = [&args[..], &["--mcap", log.to_str().unwrap()]].concat();
+    let (text, data) = page(folder.path(), "seen.html", &args);
+    // 520 cycles of 10 ms, the plan's time 0 in the 100th, and the state is 1 µs older.
+    assert!(text.contains("0.0225 rad"), "the largest deviation");
+    let name = &arm.joint_names()[3];
+    assert!(text.contains(&format!("of {name} from its setpoint, at 4.2 s")));
+    let motion = &data["measured"][0];
+    assert_eq!(motion["starts_at"], 0.0);
+    let (times, q) = (floats(&motion["times"]), floats(&motion["q"]));
+    assert!(times.len() > 500 && times.len() < 700, "{}", times.len());
+    assert!((times.last().unwrap() - 11.7).abs() < 0.02, "{:?}", times.last());
+    for (i, time) in times.iter().enumerate().skip(1) {
+        // The setpoint that was answered is a cycle before the stamp's.
+        let planned = time - 0.01 + 1e-6;
+        let k = ((planned / 0.3) as usize + 1).min(39);
+        let curve = plan.curve(k).at(((planned - 0.3 * (k - 1) as f64) / 0.3).min(1.0));
+        for j in 0..arm.dof() {
+            let apart = q[i * arm.dof() + j] - curve[j];
+            let most = if j == 3 { 0.0226 } else { 1e-5 };
+            assert!(apart.abs() < most, "joint {j} at {time} s: {apart}");
+        }
+    }
+    let deviation = motion["series"][0].clone();
+    assert_eq!(deviation["name"], "deviation, pad");
+    let told = floats(&deviation["values"]).into_iter().fold(0.0, f64::max);
+    assert!(told > 1.0 && text.contains(&format!("of the pad {told:.1} mm")), "{told}");
+    let bytes = std::fs::read(&log).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap();
+    let seen = messages.filter(|m| m.as_ref().unwrap().channel.topic == "/measured/joint_states");
+    assert!(seen.count() > 500);
+}
+
+#[test]
+fn a_recording_alone_shows_what_was_commanded_and_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, arm) = plan(Side::Right, Profile::Velocity);
+    let recording = flight(folder.path(), &plan, &arm);
+    let (text, data) = page(folder.path(), "alone.html", &[recording.to_str().unwrap()]);
+    assert!(text.contains("flight recording") && text.contains("0.0225 rad"));
+    assert!(text.contains("1 plan ran"));
+    let [commanded, measured] = ["plans", "measured"].map(|list| floats(&data[list][0]["times"]));
+    assert!(commanded.len() > 500 && measured.len() > 500);
+    assert!((commanded.last().unwrap() - 11.71).abs() < 0.01, "{:?}", commanded.last());
+}
+
+#[test]
+fn a_recording_that_does_not_fit_is_refused_with_what_to_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, arm) = plan(Side::Right, Profile::Velocity);
+    let recording = flight(folder.path(), &plan, &arm);
+    let mut other = plan.clone();
+    other.knots[7].time_ns += 1;
+    let other = write(folder.path(), "other.json", &other);
+    let told = |files: &[&Path]| {
+        let out = folder.path().join("no.html");
+        let files = files.iter().map(|file| file.to_str().unwrap());
+        let flags = ["view", "--no-open", "--out", out.to_str().unwrap()];
+        let done = planner(&flags.into_iter().chain(files).collect::<Vec<_>>());
+        assert_eq!(done.status.code(), Some(1));
+        assert!(!out.exists());
+        String::from_utf8_lossy(&done.stderr).into_owned()
+    };
+    let said = told(&[&other, &recording]);
+    assert!(said.contains("none of the plans given ran in the recording; 1 other did"), "{said}");
+    let said = told(&[&recording, &recording]);
+    assert!(said.contains("name the plan that ran too"), "{said}");
+    let mut bytes = std::fs::read(&recording).unwrap();
+    bytes[6] = b'5';
+    let old = folder.path().join("old.nswrec");
+    std::fs::write(&old, bytes).unwrap();
+    let said = told(&[&old]);
+    assert!(said.contains("old.nswrec: not a flight recording of this version"), "{said}");
 }
 
 #[test]

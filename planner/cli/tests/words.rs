@@ -56,6 +56,79 @@ fn an_output_that_cannot_be_written_is_told_before_the_work() {
         assert!(said.contains("cannot write no/such/folder/x"), "{flag}: {said}");
         assert_eq!(said.matches("No such file").count(), 1, "{said}");
     }
+    for command in [
+        "scene missing.pcd --out",
+        "scene missing.pcd --report",
+        "verify missing.json --out",
+        "verify missing.json --json",
+        "task missing.csv --out",
+        "task missing.csv --json",
+        "view missing.json --no-open --out",
+        "view missing.json --no-open --mcap",
+    ] {
+        let (code, _, said) = run(folder.path(), &format!("{command} no/such/folder/x"));
+        assert_eq!(code, Some(1), "{said}");
+        assert!(said.contains("cannot write no/such/folder/x"), "{command}: {said}");
+    }
+}
+
+#[test]
+fn a_note_is_told_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("cell.toml"), "[scene]\nsupport_height = 0.7\n")
+        .expect("written");
+    let (code, _, said) = run(folder.path(), "cell check");
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(said.matches("home is taken to be").count(), 1, "{said}");
+}
+
+#[test]
+fn a_scene_file_is_taken_beside_a_cell_that_says_which_way_is_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let points: String = (0..3600)
+        .map(|i| format!("{} {} 0\n", 0.01 * f64::from(i / 60), 0.01 * f64::from(i % 60)))
+        .collect();
+    std::fs::write(folder.path().join("scan.xyz"), points).expect("written");
+    let (code, _, said) = run(folder.path(), "scene scan.xyz --out scene.toml");
+    assert_eq!(code, Some(0), "{said}");
+    std::fs::write(folder.path().join("cell.toml"), "[scene]\nup = [0, 0, 1]\n").expect("written");
+    let (code, _, said) = run(folder.path(), "view scene.toml --no-open --out view.html");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("scene.toml says how its scans stand: --up and --scale"), "{said}");
+    let pose = "view scene.toml --no-open --sensor-pose 0,0,1,0,0,0,1";
+    let (code, _, said) = run(folder.path(), pose);
+    assert_eq!(code, Some(2), "{said}");
+}
+
+#[test]
+fn a_full_disk_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    long_plan(&folder.path().join("plan.json"));
+    let told = |said: &str| {
+        assert_eq!(said.matches("No space left").count(), 1, "{said}");
+        assert!(said.starts_with("planner: ") && !said.contains("panicked"), "{said}");
+    };
+    for command in
+        ["inspect plan.json", "inspect plan.json --json -", "view plan.json --no-open --out v.html"]
+    {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+        let done = planner(folder.path(), command).stdout(full).output().expect("it starts");
+        assert_eq!(done.status.code(), Some(1), "{command}");
+        let said = String::from_utf8(done.stderr).expect("text");
+        told(&said);
+        assert!(said.contains("standard output"), "{said}");
+    }
+    for command in [
+        "inspect plan.json --json /dev/full",
+        "export plan.json --format csv --out /dev/full",
+        "view plan.json --no-open --out /dev/full",
+        "view plan.json --no-open --out v.html --mcap /dev/full",
+    ] {
+        let (code, _, said) = run(folder.path(), command);
+        assert_eq!(code, Some(1), "{said}");
+        told(&said);
+        assert!(said.contains("/dev/full"), "{said}");
+    }
 }
 
 #[test]

@@ -10,11 +10,11 @@ mod programs;
 use std::process::ExitCode;
 
 use arguments::{Cli, Command};
-use clap::Parser;
 use programs::{EXECUTOR, PLANNER, start, start_endpoint};
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let cli: Cli = nullsweep_cell::parse_alone(std::env::args_os()).unwrap_or_else(|e| e.exit());
+    let result = match cli.command {
         Command::Doctor => doctor::run(),
         Command::Completions { shell } => describe::completions(shell),
         Command::Man { folder } => describe::manuals(&folder),

@@ -365,12 +365,15 @@ function rowsOf(what) {
     return data.joints.map((joint, j) => ({ name: title(joint), unit: `${joint.unit}/s`,
       lines: both(m => velocities(m, j)) }));
   }
-  const names = [...new Set(plans.flatMap(m => m.series.map(s => s.name)))];
-  const first = name => plans.flatMap(m => m.series).find(s => s.name === name);
+  const of = name => m => m.series.find(s => s.name === name);
+  const with_ = (motions, name) => motions.filter(of(name));
+  const all = [...plans, ...measured];
+  const names = [...new Set(all.flatMap(m => m.series.map(s => s.name)))];
+  const first = name => of(name)(with_(all, name)[0]);
   return names.map(name => ({ name: name.replace(', ', '\n'), unit: first(name).unit,
     most: first(name).most ?? Infinity, zero: true, digits: 1,
-    lines: lines(plans.filter(m => m.series.some(s => s.name === name)),
-      m => m.series.find(s => s.name === name), COLOURS) }));
+    lines: [...lines(with_(plans, name), of(name), COLOURS),
+      ...lines(with_(measured, name), of(name), ['--measured'])] }));
 }
 
 /** Stretches of time in which what runs is off the surface. */
@@ -408,8 +411,12 @@ function refresh() {
   }
   $('time').value = player.time;
   const knot = before(running.times, own);
-  const on = running.contact ? (running.contact[Math.min(knot + 1, running.times.length - 1)] === 1 ? 'on the surface' : 'in transfer') : '';
-  $('now').textContent = `${player.time.toFixed(2)} of ${end.toFixed(1)} s · ${plans.length > 1 ? `${running.name}, ` : ''}knot ${knot} · ${on}`;
+  const ahead = Math.min(knot + 1, running.times.length - 1);
+  const words = [`${player.time.toFixed(2)} of ${end.toFixed(1)} s`,
+    `${plans.length > 1 ? `${running.name}, ` : ''}knot ${knot}`];
+  if (running.contact) words.push(running.contact[ahead] === 1 ? 'on the surface' : 'in transfer');
+  $('now').textContent = words.join(' · ');
+  if (document.activeElement !== $('knot')) $('knot').value = knot;
   curves?.cursor(player.time);
 }
 
@@ -472,7 +479,7 @@ function buildPlayer() {
   curves = new Curves($('plot'), t => { play(false); seek(t); });
   for (const button of $('tabs').querySelectorAll('[data-tab]')) {
     button.onclick = () => tab(button.dataset.tab);
-    if (button.dataset.tab === 'distances' && !plans.some(m => m.series.length)) button.remove();
+    if (button.dataset.tab === 'distances' && ![...plans, ...measured].some(m => m.series.length)) button.remove();
   }
   tab('positions');
 }
@@ -499,8 +506,8 @@ function keys(e) {
 }
 
 /** What a test asks. */
-window.nullsweep = { player, seek, padAt, jointsAt, plans, misfit, frames, visit, end,
-  get camera() { return space?.camera; }, bodies: () => moving };
+window.nullsweep = { player, seek, padAt, jointsAt, plans, measured, misfit, runningAt, frames, visit, end,
+  get camera() { return space?.camera; }, draw: () => space?.finish(player.time), bodies: () => moving };
 
 theme(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 $('theme').onclick = () => theme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark');

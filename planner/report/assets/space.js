@@ -204,10 +204,13 @@ class Space {
       gl.uniform4fv(places.colour, colour);
       gl.bindVertexArray(thing.array);
       if (thing.kind === 'mesh') {
+        // What was measured shows only where it is not where the plan is.
+        if (thing.ghost) { gl.enable(gl.POLYGON_OFFSET_FILL); gl.polygonOffset(2, 8); }
         for (const model of thing.models()) {
           gl.uniformMatrix4fv(places.model, false, model);
           gl.drawArrays(gl.TRIANGLES, 0, thing.count);
         }
+        gl.disable(gl.POLYGON_OFFSET_FILL);
       } else if (thing.kind === 'points') {
         gl.uniform3fv(places.low, thing.low);
         gl.uniform3fv(places.size, thing.size);
@@ -226,6 +229,12 @@ class Space {
     gl.depthMask(true);
     gl.bindVertexArray(null);
     this.stale = false;
+  }
+
+  /** Draws and waits until it is drawn. */
+  finish(now) {
+    this.draw(now);
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   /** A circle that faces the camera about the place that was flown to. */

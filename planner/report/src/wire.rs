@@ -172,17 +172,20 @@ fn bounds<'a>(
 }
 
 /// The ball that the page opens on, and the side that it is seen from: what is to be swept and the
-/// arm's shoulder; without either, whatever there is. `None`: there is nothing in space.
+/// arm's shoulder; without that, where the pad goes; without either, whatever there is. `None`: there
+/// is nothing in space.
 fn focus(data: &ReportData) -> Option<Value> {
     let surface = |c: &&Cloud| !matches!(c.paint, Paint::Around | Paint::Unseen);
     let surface: Vec<_> =
         data.clouds.iter().filter(surface).flat_map(|c| &c.points).copied().collect();
     let swept = bounds(&surface);
     let shoulder = data.bodies.first().map(|body| Point3::from(body.rest.translation.vector));
+    let pads: Vec<_> = data.plans.iter().flat_map(|m| &m.probes).map(|probe| probe.pad).collect();
     let everything = || data.clouds.iter().flat_map(|c| &c.points);
     let lines = || data.lines.iter().flat_map(|l| &l.lines).flatten();
     let (low, high) = match (swept, shoulder) {
         (Some(_), shoulder) => bounds(surface.iter().chain(&shoulder))?,
+        (None, Some(shoulder)) if !pads.is_empty() => bounds(pads.iter().chain([&shoulder]))?,
         (None, Some(shoulder)) => {
             let reach = Vector3::repeat(0.7);
             (shoulder - reach, shoulder + reach)

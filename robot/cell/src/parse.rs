@@ -17,6 +17,9 @@ use crate::file::{Cell, FILE_NAME};
 /// Names the cell file where `--cell` does not; empty: there is none.
 pub const VARIABLE: &str = "NULLSWEEP_CELL";
 
+/// Columns that help takes at most.
+const WIDTH: usize = 80;
+
 /// Parses a command line, program name first. Flags that it leaves out are taken from the cell file
 /// that `--cell` or [`VARIABLE`] names, or the nearest one in the working folder and above; the
 /// latter is told on standard error. `apart`: subcommands that take some flags from no cell; `urgent`:
@@ -30,7 +33,7 @@ pub fn parse<P: Parser>(
     urgent: &[&str],
 ) -> Result<P, Error> {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
-    let command = P::command().arg(cell_argument());
+    let command = P::command().max_term_width(WIDTH).arg(cell_argument());
     describe(&args, &command);
     let given = given(&args).map(|(_, path)| path).or_else(variable);
     let is_given = given.is_some();
@@ -92,8 +95,9 @@ pub fn parse_alone<P: Parser>(
     args: impl IntoIterator<Item = impl Into<OsString>>,
 ) -> Result<P, Error> {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
-    describe(&args, &P::command());
-    P::try_parse_from(args)
+    let command = P::command().max_term_width(WIDTH);
+    describe(&args, &command);
+    P::from_arg_matches_mut(&mut command.try_get_matches_from(args)?)
 }
 
 /// Where it is asked for, writes the description and ends the process.

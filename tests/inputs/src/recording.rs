@@ -1,6 +1,7 @@
-//! A flight recording. Its seals are set right first: a forger would know how.
+//! A flight recording, run again and read. Its seals are set right first: a forger would know how.
 
 use nullsweep_executor::replay;
+use nullsweep_recording::Recording;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::file;
@@ -17,7 +18,8 @@ pub(crate) fn run(bytes: &[u8]) -> bool {
     let mut forged = bytes.to_vec();
     seal(&mut forged);
     let sealed = file::with(&forged, replay);
-    raw.is_ok_and(|r| r.setpoints > 0) && sealed.is_ok_and(|r| r.setpoints > 0)
+    let read = file::with(&forged, Recording::read);
+    raw.is_ok_and(|r| r.setpoints > 0) && sealed.is_ok_and(|r| r.setpoints > 0) && read.is_ok()
 }
 
 /// Seals every record as it stands.

@@ -2,10 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use crate::markdown::{self, Piece, link_path, pieces};
+use crate::markdown::{self, Piece, anchors, link_path, pieces};
 use crate::packages::{Kind, Package, packages};
 use crate::programs::Commands;
 use crate::tree::{Offence, Tree, extension, folder, join};
+
+/// Chapters of the book that are not there, and pages of its folder that are no chapters.
+pub(crate) fn check_book(tree: &Tree, summary: &str) -> Vec<Offence> {
+    let text = tree.with_extension("md").find(|(path, _)| *path == summary).map(|(_, text)| text);
+    let Some(text) = text else { return vec![Offence::new(summary, 0, "there is no book")] };
+    let links = pieces(text).into_iter().filter(|piece| piece.kind == markdown::Kind::Link);
+    let chapters: Vec<String> =
+        links.filter_map(|piece| join(folder(summary), &piece.text)).collect();
+    let pages = tree.with_extension("md").map(|(path, _)| path);
+    let pages = pages.filter(|path| folder(path) == folder(summary) && *path != summary);
+    let told = |path| Offence::new(path, 0, format!("is no chapter of {summary}"));
+    pages.filter(|path| !chapters.iter().any(|one| one == path)).map(told).collect()
+}
 
 /// Files with these extensions are of the repository, not of a user.
 const SOURCES: [&str; 8] = ["rs", "toml", "md", "py", "sh", "urdf", "svg", "msg"];
@@ -48,9 +61,7 @@ pub(crate) fn check(tree: &Tree, programs: &[&str]) -> Vec<Offence> {
 impl Known<'_> {
     fn missing(&self, document: &str, piece: &Piece) -> Vec<String> {
         if piece.kind == markdown::Kind::Link {
-            let Some(path) = link_path(&piece.text) else { return Vec::new() };
-            let there = join(folder(document), path).is_some_and(|path| self.tree.has(&path));
-            return if there { Vec::new() } else { vec![format!("no {path}")] };
+            return self.missing_in_link(document, &piece.text).into_iter().collect();
         }
         let text = piece.text.split(" #").next().unwrap_or_default().replace(';', " ; ");
         let words: Vec<&str> = text.split_whitespace().collect();
@@ -65,6 +76,23 @@ impl Known<'_> {
             missing.extend(self.missing_in_command(command));
         }
         missing
+    }
+
+    /// A file that is not there, or a heading that it does not have.
+    fn missing_in_link(&self, document: &str, target: &str) -> Option<String> {
+        let (path, anchor) = target.split_once('#').unwrap_or((target, ""));
+        let leads = match link_path(target) {
+            Some(path) => join(folder(document), path).filter(|path| self.tree.has(path)),
+            None if path.is_empty() => Some(document.to_owned()),
+            None => return None,
+        };
+        let Some(leads) = leads else { return Some(format!("no {path}")) };
+        if anchor.is_empty() || extension(&leads) != "md" {
+            return None;
+        }
+        let mut texts = self.tree.with_extension("md").filter(|(path, _)| *path == leads);
+        let there = texts.any(|(_, text)| anchors(text).iter().any(|one| one == anchor));
+        (!there).then(|| format!("no #{anchor}"))
     }
 
     /// Whether this is no path of ours, or one that exists. `alone`: nothing else stands between
@@ -166,6 +194,23 @@ mod tests {
             cargo test --test t; cargo bench --bench b -- --test\n```\n\
             ```\nx paln x/gone.rs\n```\n";
         assert_eq!(told(document), [""; 0]);
+    }
+
+    #[test]
+    fn a_link_leads_to_a_heading_that_is_there() {
+        let document = "# The one, and more\n[a](#the-one-and-more), [b](d.md#the-one-and-more),\n\
+            [c](../x/src/deep/a.rs#L1)\n[d](#gone), [e](d.md#the-one)\n";
+        assert_eq!(told(document), ["no #gone", "no #the-one"]);
+    }
+
+    #[test]
+    fn a_page_that_is_no_chapter_is_told() {
+        let book = "# Summary\n- [a](a.md)\n";
+        let tree =
+            Tree::of(&[("d/SUMMARY.md", book), ("d/a.md", ""), ("d/b.md", ""), ("x.md", "")]);
+        let told = check_book(&tree, "d/SUMMARY.md");
+        assert_eq!(told, [Offence::new("d/b.md", 0, "is no chapter of d/SUMMARY.md")]);
+        assert_eq!(check_book(&tree, "e/SUMMARY.md").len(), 1);
     }
 
     #[test]

@@ -95,3 +95,9 @@ fn documents_name_what_exists() {
     let offences = documents::check(&TREE, house::PROGRAMS);
     expect_none(offences, "Mend the document.");
 }
+
+#[test]
+fn every_page_is_a_chapter_of_the_book() {
+    let offences = documents::check_book(&TREE, "docs/SUMMARY.md");
+    expect_none(offences, "Name it in the summary.");
+}

@@ -66,11 +66,37 @@ fn links(line: &str) -> impl Iterator<Item = &str> {
     inline.chain(named.map(|(_, target)| target.trim()))
 }
 
+/// The anchors of a document's headings, as they are made of their words.
+pub(crate) fn anchors(document: &str) -> Vec<String> {
+    let mut inside = false;
+    let mut found: Vec<String> = Vec::new();
+    for line in document.lines() {
+        inside ^= line.trim_start().starts_with("```");
+        let title = line.trim_start_matches('#');
+        let depth = line.len() - title.len();
+        if inside || !(1..=6).contains(&depth) || !title.starts_with(' ') {
+            continue;
+        }
+        let kept = |c: &char| c.is_alphanumeric() || ['-', '_', ' '].contains(c);
+        let slug: String = title.trim().to_lowercase().chars().filter(kept).collect();
+        let slug = slug.replace(' ', "-");
+        let same = found.iter().filter(|one| **one == slug).count();
+        found.push(if same > 0 { format!("{slug}-{same}") } else { slug });
+    }
+    found
+}
+
 /// Where a link leads, without its anchor; `None` for what is no file of ours.
 pub(crate) fn link_path(target: &str) -> Option<&str> {
     let path = target.split('#').next().unwrap_or(target);
     let elsewhere = path.is_empty() || path.contains(':') || path.starts_with('/');
     (!elsewhere).then_some(path)
+}
+
+#[test]
+fn anchors_are_made_of_headings() {
+    let document = "# Words, `widths` (two)\n```sh\n# no heading\n```\n## A-b_c\n## A-b_c\n#no\n";
+    assert_eq!(anchors(document), ["words-widths-two", "a-b_c", "a-b_c-1"]);
 }
 
 #[test]

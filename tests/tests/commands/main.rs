@@ -5,6 +5,8 @@
 //! are one session), `<!-- run in the background: NAME -->`, or `<!-- not run: REASON -->`.
 
 mod blocks;
+mod keys;
+mod reference;
 mod session;
 
 use std::collections::{BTreeMap, BTreeSet};

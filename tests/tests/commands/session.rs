@@ -143,7 +143,7 @@ fn flags(words: &[&str]) -> Vec<String> {
     flags.map(|flag| flag.split('=').next().unwrap_or_default().to_owned()).collect()
 }
 
-/// The commands of a program, by what it tells of itself.
+/// The commands of a program.
 pub(crate) fn commands(program: &str) -> Vec<String> {
     described(program).below().iter().map(|below| below.name().to_owned()).collect()
 }
@@ -165,7 +165,7 @@ pub(crate) fn flags_of(words: &[String]) -> BTreeSet<String> {
 }
 
 /// What a program tells of itself.
-fn described(program: &str) -> Described {
+pub(crate) fn described(program: &str) -> Described {
     let mut command = match WHOLE.iter().find(|(name, ..)| *name == program) {
         Some((.., path)) => Command::new(path),
         None => Command::new(DEMO),
@@ -176,4 +176,12 @@ fn described(program: &str) -> Described {
     let output = command.arg(DESCRIBE).env(nullsweep_cell::VARIABLE, "").output();
     let text = String::from_utf8(output.expect("it starts").stdout).expect("text");
     Described::from_json(&text).expect("a description")
+}
+
+/// What a program says of itself.
+pub(crate) fn help(words: &[String]) -> String {
+    let mut command = Command::new(DEMO);
+    command.arg(format!("__{}", words[0])).args(&words[1..]).arg("--help");
+    let output = command.env(nullsweep_cell::VARIABLE, "").output().expect("it starts");
+    String::from_utf8_lossy(&output.stdout).into_owned()
 }

@@ -1,12 +1,15 @@
 //! The figures that matter most, and what they rest on.
 
 use nullsweep_planner::plan::Plan;
+use nullsweep_planner::sweep::coverage;
 use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Headline, Look, Motion, Tone};
+use nullsweep_robot::Arm;
 
+use super::flight::Flight;
 use super::motion::REACH;
-use super::points::Points;
+use super::points::{Points, shares, surface};
 use super::robot::Shown;
 use super::sitter::Sitter;
 
@@ -43,14 +46,30 @@ pub(super) fn headline(
         let detail = format!("of {} scanned points", points.all);
         tell("Swept of all", percent(share), detail, Tone::Plain);
         let tone = if points.left == 0 { Tone::Good } else { Tone::Plain };
-        tell("Left", percent(left), format!("in {places} places, by cause in the list"), tone);
+        tell(
+            "Left",
+            percent(left),
+            format!("in {}, by cause in the list", count(places, "place")),
+            tone,
+        );
     }
     let end = motions.last().map_or(0.0, |m| m.starts_at + m.times.last().copied().unwrap_or(0.0));
     let detail = match motions.len() {
-        1 => format!("{} knots", plan.knots.len()),
+        1 => count(plan.knots.len(), "knot"),
         n => format!("{n} plans, the last takes over at {:.1} s", motions[n - 1].starts_at),
     };
     tell("Time", format!("{end:.1} s"), detail, Tone::Plain);
+    for flight in sitter.flights {
+        let begins = motions.get(flight.first).map_or(0.0, |m| m.starts_at);
+        if let Some((value, detail)) = deviation(flight, sitter.arm, begins) {
+            tell("Largest deviation", value, detail, Tone::Plain);
+        }
+        let swept = measured_shares(plan, sitter.arm, flight);
+        if let [Some(of_reachable), Some(of_all)] = swept {
+            let detail = format!("of reachable, as measured; {} of all", percent(of_all));
+            tell("Swept in fact", percent(of_reachable), detail, Tone::Plain);
+        }
+    }
     let (value, detail, tone) = violations(plan, sitter.verification);
     tell("Violations", value, detail, tone);
     let least = motions
@@ -66,6 +85,31 @@ pub(super) fn headline(
     (headline, notes(plan, here, robot, sitter.verification))
 }
 
+/// How far a measured joint was from its setpoint, and where; `begins`: the flight's start on the page's
+/// clock. \[s\]
+pub(super) fn deviation(flight: &Flight, arm: &Arm, begins: f64) -> Option<(String, String)> {
+    let (j, by, at) = flight.joint?;
+    let unit = if arm.is_revolute(j) { "rad" } else { "m" };
+    let name = &arm.joint_names()[j];
+    let mut detail = format!("of {name} from its setpoint, at {:.1} s", begins + at);
+    if let Some((by, at)) = flight.pad {
+        detail += &format!("; of the pad {:.1} mm, at {:.1} s", 1e3 * by, begins + at);
+    }
+    Some((format!("{by:.4} {unit}"), detail))
+}
+
+/// Shares of the points that the measured arm swept: of those that are reachable, of all.
+fn measured_shares(plan: &Plan, arm: &Arm, flight: &Flight) -> [Option<f64>; 2] {
+    let pad = plan.tool.on(arm);
+    let poses: Vec<_> = flight.swept.iter().map(|q| pad.pose(q)).collect();
+    shares(plan, &coverage::swept(&surface(plan), &poses, &plan.tool))
+}
+
+/// How many there are of what, in one word or two.
+fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 fn violations(plan: &Plan, verification: Option<&Verification>) -> (String, String, Tone) {
     let Some(found) = verification else {
         return match plan.check_seal() {
@@ -78,8 +122,8 @@ fn violations(plan: &Plan, verification: Option<&Verification>) -> (String, Stri
     let against = &found.against;
     let measured = against.surface_points + against.other_points + against.raw_points;
     let unseen = if against.unseen_points > 0 { ", unseen space" } else { "" };
-    let (obstacles, but_for) = (against.obstacles, against.but_for());
-    let detail = format!("against {measured} points{unseen}, {obstacles} obstacles{but_for}");
+    let (obstacles, but_for) = (count(against.obstacles, "obstacle"), against.but_for());
+    let detail = format!("against {measured} points{unseen}, {obstacles}{but_for}");
     let tone = if found.violations.is_empty() { Tone::Good } else { Tone::Bad };
     (found.violations.len().to_string(), detail, tone)
 }

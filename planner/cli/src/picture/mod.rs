@@ -1,19 +1,24 @@
 //! What a plan looks like: the data of its page.
 
+mod flight;
 mod headline;
 mod motion;
 mod points;
+mod recorded;
 mod robot;
 mod sitter;
 
 use anyhow::ensure;
-use nullsweep_report::{JointAxis, ReportData};
+use nullsweep_report::{JointAxis, Motion, ReportData};
 use nullsweep_robot::Arm;
 
 use headline::headline;
 use motion::motions;
 use points::Points;
 
+pub(super) use flight::Flight;
+pub(super) use recorded::recorded;
+pub(super) use robot::Posed;
 pub(super) use sitter::Sitter;
 
 /// The page of some plans.
@@ -30,8 +35,11 @@ pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
     }
     let here = sitter.scene.map(|scene| scene.transformed(&plan.base_pose().inverse()));
     let points = Points::of(plan, sitter.arm, here.as_ref(), sitter.verification, sitter.left_out);
-    let robot = robot::shapes(&sitter, here.as_ref())?;
+    let (tool, collision) = (&plan.tool, sitter.collision);
+    let posed = Posed { robot: sitter.robot, arm: sitter.arm, tool, collision };
+    let robot = robot::shapes(posed, here.as_ref())?;
     let plans = motions(&sitter, here.as_ref())?;
+    let measured: Vec<Motion> = sitter.flights.iter().map(|f| f.after(&plans)).collect();
     let (headline, notes) = headline(&sitter, here.as_ref(), &points, &plans, &robot);
     Ok(ReportData {
         title: "Nullsweep coverage plan".into(),
@@ -56,7 +64,7 @@ pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
         pad: Some(robot.pad),
         joints: joint_axes(sitter.arm),
         plans,
-        measured: Vec::new(),
+        measured,
     })
 }
 

@@ -79,23 +79,28 @@ impl Points {
             let unseen = cloud("unseen space", Paint::Unseen, scene.unseen.clone());
             clouds.push(Cloud { shown: false, ..unseen });
         }
-        let share = |of: &dyn Fn(usize) -> bool| {
-            let all = (0..swept.len()).filter(|i| of(*i)).count();
-            let hit = (0..swept.len()).filter(|i| of(*i) && swept[*i]).count();
-            (all > 0).then(|| hit as f64 / all as f64)
-        };
         Self {
             clouds,
             places: places(&causes, &left, swept.len()),
             all: swept.len(),
             left: left.len(),
-            shares: [share(&|i| plan.surface[i].reachable), share(&|_| true)],
+            shares: shares(plan, &swept),
         }
     }
 }
 
+/// Shares of swept points: of those that are reachable, of all; `None`: there are none.
+pub(super) fn shares(plan: &Plan, swept: &[bool]) -> [Option<f64>; 2] {
+    let share = |of: &dyn Fn(usize) -> bool| {
+        let all = (0..swept.len()).filter(|i| of(*i)).count();
+        let hit = (0..swept.len()).filter(|i| of(*i) && swept[*i]).count();
+        (all > 0).then(|| hit as f64 / all as f64)
+    };
+    [share(&|i| plan.surface[i].reachable), share(&|_| true)]
+}
+
 /// The points that the plan is to sweep.
-fn surface(plan: &Plan) -> Scan {
+pub(super) fn surface(plan: &Plan) -> Scan {
     let normal = |n: [f64; 3]| UnitVector3::new_normalize(Vector3::from(n));
     Scan {
         points: plan.surface.iter().map(|s| Point3::from(s.point)).collect(),

@@ -1,14 +1,23 @@
 //! The robot's shapes, and what stands around it.
 
 use nalgebra::Point3;
-use nullsweep_collision::{Figure, ObstacleShape};
+use nullsweep_collision::{Figure, ObstacleShape, Options};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{Body, Look, PadCentre, Shape};
-
-use super::sitter::Sitter;
+use nullsweep_robot::{Arm, Robot, Tool};
 
 /// How far the drawn piece of the floor reaches beyond what is there. \[m\]
 const AROUND: f64 = 0.4;
+
+/// A robot with its tool.
+#[derive(Clone, Copy)]
+pub(crate) struct Posed<'a> {
+    pub(crate) robot: &'a Robot,
+    /// The arm, its other joints where they are held.
+    pub(crate) arm: &'a Arm,
+    pub(crate) tool: &'a Tool,
+    pub(crate) collision: &'a Options,
+}
 
 /// The robot as it is checked.
 pub(super) struct Shown {
@@ -18,9 +27,8 @@ pub(super) struct Shown {
 }
 
 /// Robot, tool, obstacles and floor in the root frame.
-pub(super) fn shapes(sitter: &Sitter<'_>, here: Option<&Scene>) -> anyhow::Result<Shown> {
-    let Sitter { robot, arm, plans, collision, .. } = sitter;
-    let tool = &plans[plans.len() - 1].tool;
+pub(super) fn shapes(figure: Posed<'_>, here: Option<&Scene>) -> anyhow::Result<Shown> {
+    let Posed { robot, arm, tool, collision } = figure;
     let figure = Figure::new(robot, arm, tool, collision)?;
     let (body, tip) = figure.tip;
     let centre = Point3::from((tip * tool.contact_in_tip()).translation.vector);

@@ -8,6 +8,8 @@ use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{LineSet, Table};
 use nullsweep_robot::{Arm, Robot};
 
+use super::flight::Flight;
+
 /// Plans with what they are shown in.
 pub(crate) struct Sitter<'a> {
     /// Plans as they follow each other; the last one's scan, figures and stance are shown.
@@ -22,6 +24,8 @@ pub(crate) struct Sitter<'a> {
     pub(crate) verification: Option<&'a Verification>,
     /// What the last plan leaves, by cause, where its making told it.
     pub(crate) left_out: &'a [LeftOut],
+    /// What was measured while they ran.
+    pub(crate) flights: &'a [Flight],
     pub(crate) tables: Vec<Table>,
     pub(crate) lines: Vec<LineSet>,
 }

@@ -1,7 +1,6 @@
 //! What can be wrong with a scan.
 
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -133,12 +132,4 @@ pub(super) struct Malformed {
 /// Shorthand for the parsers.
 pub(super) fn malformed<T>(place: Place, cause: impl Into<String>) -> Result<T, Malformed> {
     Err(Malformed { place, cause: cause.into() })
-}
-
-/// What a library of others makes of a file. Not all of them are written for files that lie about
-/// themselves: where one gives up by a panic, the file is malformed.
-pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Malformed>) -> Result<T, Malformed> {
-    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| {
-        malformed(Place::File, "it says of itself what is not so: the reader of its format gave up")
-    })
 }

@@ -12,7 +12,8 @@ use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Matrix4, Point3};
 use percent_encoding::percent_decode_str;
 
-use super::error::{Malformed, Place, guarded, malformed};
+use super::error::{Malformed, Place, malformed};
+use super::guarded::guarded;
 use super::parsed::Parsed;
 use super::warning::ScanWarning;
 

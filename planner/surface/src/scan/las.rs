@@ -5,7 +5,8 @@ use std::io::Cursor;
 use las::Reader;
 use nalgebra::Point3;
 
-use super::error::{Malformed, Place, guarded, malformed};
+use super::error::{Malformed, Place, malformed};
+use super::guarded::guarded;
 use super::parsed::Parsed;
 use super::warning::ScanWarning;
 

@@ -18,6 +18,7 @@ mod e57;
 mod error;
 mod foreign;
 mod gltf;
+mod guarded;
 mod inside;
 mod las;
 mod loose;
