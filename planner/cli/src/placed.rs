@@ -263,10 +263,10 @@ mod tests {
         let sensors = |line: &[&str]| {
             let args = Line::parse_from(line).placed;
             let found = read_scans(&args, &scans, 1, Gravity::Given, &bars).expect("scans");
-            let back = |(view, pose): (&scan::View, &Isometry3<f64>)| {
-                view.sensor.map(|at| pose.inverse() * at)
+            let back = |(view, source): (&scan::View, &Source)| {
+                view.sensor.map(|at| source.pose.inverse() * at)
             };
-            found.scan.views.iter().zip(&found.poses).map(back).collect::<Vec<_>>()
+            found.scan.views.iter().zip(&found.sources).map(back).collect::<Vec<_>>()
         };
         let is_at = |found: Option<Point3<f64>>, y: f64| {
             found.is_some_and(|at| (at - Point3::new(5.0, y, 7.0)).norm() < 1e-9)
