@@ -185,15 +185,16 @@ fn given_poses_are_planned_as_ever() {
         arm: ArmSpec::pr2(Side::Right),
         tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
         tolerance: Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]),
-        held: Vec::new(),
-        obstacles: Vec::new(),
+        stance: Stance { base: [0.0; 3], held: Vec::new() },
+        start: None,
+        profile: Profile::Velocity,
         collision: Options::default(),
         v_max: None,
         rounds: 2,
         trials: 10,
         seed: 1,
     };
-    let outcome = task::run(&Robot::pr2(), &common::dome(), &config, &Silent).expect("a plan");
+    let outcome = task::run(&Robot::pr2(), &common::dome(), &Scene::of_obstacles(Vec::new()), &config, &Silent).expect("a plan");
     assert_golden(
         &[("dome".into(), outcome.plan.digest().expect("short enough"))],
         &[("dome", 0xb916e2324f907aff)],

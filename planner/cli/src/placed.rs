@@ -142,8 +142,8 @@ fn together(
     // What is lowest of all files rests on the support.
     let whole = match placement {
         Placement::Up { .. } if files.len() > 1 => {
-            let points = files.iter().flat_map(|(_, raw)| raw.points.iter().copied()).collect();
-            &RawScan { points, normals: None, ..first.clone() }
+            let points = files.iter().flat_map(|(_, raw)| raw.anchors().iter().copied()).collect();
+            &RawScan { points, vertices: Vec::new(), normals: None, ..first.clone() }
         }
         _ => first,
     };

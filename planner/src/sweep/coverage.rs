@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 use nullsweep_robot::{Arm, Tool};
-use nullsweep_surface::{Grid, Scan};
+use nullsweep_surface::{Grid, Patch, Scan};
 
 use super::pads::contact_motion;
 use crate::plan::Trajectory;
@@ -32,6 +32,19 @@ pub fn swept(scan: &Scan, contact_poses: &[Isometry3<f64>], tool: &Tool) -> Vec<
         });
     }
     swept
+}
+
+/// Whether a pad that is led over the middle of a patch sweeps a point of the scan there, whatever its
+/// heading.
+#[must_use]
+pub fn sweeps(scan: &Scan, point: u32, patch: &Patch, tool: &Tool) -> bool {
+    let (point, normal) = (scan.points[point as usize], scan.normals[point as usize]);
+    let offset = point - patch.centre;
+    let height = offset.dot(&patch.normal);
+    let beside = (offset.norm_squared() - height * height).max(0.0).sqrt();
+    beside <= 0.5 * tool.width.min(tool.length)
+        && height.abs() <= tool.reach_normal
+        && normal.dot(&patch.normal) >= tool.reach_angle.cos()
 }
 
 /// For each point of the scan whether the pad has passed over it in one of the motions, see

@@ -22,6 +22,10 @@ const UNEVEN: f64 = 0.025;
 const TILTS: [f64; 3] = [0.07, 0.14, 0.21];
 /// Directions of each.
 const TURNS: usize = 8;
+/// Places on each piece of a line at which the pad's facing is looked at. Pieces are some 6 mm long
+/// and points of a scan a few apart, so that none of those that come to lie under the pad's centre
+/// is passed over.
+const LOOKS: usize = 4;
 /// The pad is raised and let down no more steeply than this along its way.
 const STEEPEST: f64 = 0.25;
 
@@ -144,10 +148,12 @@ impl Bed {
     /// Whether the pad would sweep the points under its centre.
     fn faces_along(&self, line: &[SurfacePoint]) -> bool {
         line.windows(2).all(|w| {
-            let middle = nalgebra::center(&w[0].point, &w[1].point);
-            let between = w[0].normal.into_inner() + w[1].normal.into_inner();
-            self.faces(&middle, &UnitVector3::new_normalize(between))
-                && self.faces(&w[1].point, &w[1].normal)
+            let [a, b] = [w[0].normal.into_inner(), w[1].normal.into_inner()];
+            (1..=LOOKS).all(|look| {
+                let share = look as f64 / LOOKS as f64;
+                let point = w[0].point + (w[1].point - w[0].point) * share;
+                self.faces(&point, &UnitVector3::new_normalize(a.lerp(&b, share)))
+            })
         })
     }
 

@@ -74,14 +74,14 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
         Placement::Viewpoint => raw.viewpoint.unwrap_or_default(),
         Placement::UpAndHeight { up, sensor_height, support_height } => {
             let upright = upright(up);
-            let mean = mean(&raw.points, &upright);
+            let mean = mean(raw.anchors(), &upright);
             let height = sensor_height + support_height;
             Isometry3::from_parts(Translation3::new(-mean.x, -mean.y, height), upright)
         }
         Placement::Up { up, support_height } => {
             let upright = upright(up);
-            let mean = mean(&raw.points, &upright);
-            let (lowest, _) = stray::support(&raw.points, &upright);
+            let mean = mean(raw.anchors(), &upright);
+            let (lowest, _) = stray::support(raw.anchors(), &upright);
             let shift = Translation3::new(-mean.x, -mean.y, support_height - lowest);
             Isometry3::from_parts(shift, upright)
         }
@@ -108,7 +108,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
 #[must_use]
 pub fn below_support(raw: &RawScan, placement: &Placement) -> usize {
     match placement {
-        Placement::Up { up, .. } => stray::support(&raw.points, &upright(up)).1,
+        Placement::Up { up, .. } => stray::support(raw.anchors(), &upright(up)).1,
         _ => 0,
     }
 }

@@ -9,6 +9,8 @@ use super::warning::ScanWarning;
 pub struct RawScan {
     /// The finite points. \[m\]
     pub points: Vec<Point3<f64>>,
+    /// The finite corners of a mesh, on which `points` were laid; empty for points. \[m\]
+    pub vertices: Vec<Point3<f64>>,
     /// Unit normals parallel to `points`, where the file has a usable one for every point.
     pub normals: Option<Vec<UnitVector3<f64>>>,
     /// Places inside what closed meshes enclose, on a grid. \[m\]
@@ -22,4 +24,13 @@ pub struct RawScan {
     pub dropped: usize,
     /// What the user should know.
     pub warnings: Vec<ScanWarning>,
+}
+
+impl RawScan {
+    /// What it is placed by: a mesh by its corners, so that it stands where it stands whatever points
+    /// a seed lays on it.
+    #[must_use]
+    pub fn anchors(&self) -> &[Point3<f64>] {
+        if self.vertices.is_empty() { &self.points } else { &self.vertices }
+    }
 }

@@ -155,12 +155,18 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     if let Some(pose) = &mut viewpoint {
         pose.translation.vector *= scale;
     }
-    let (mut dropped, mut inside) = (0, Vec::new());
+    let (mut dropped, mut inside, mut vertices) = (0, Vec::new(), Vec::new());
     if !triangles.is_empty() {
         let wound = winding::outward(&points, triangles, &mut warnings);
         inside = inside::fill(&points, &wound);
+        let corners = wound.triangles.iter().flatten();
+        let mut used = vec![false; points.len()];
+        corners.for_each(|&corner| used[corner] = true);
+        vertices = points;
         (points, normals, dropped) =
-            sample::sample(&points, &wound, options.mesh_spacing, options.seed, &mut warnings);
+            sample::sample(&vertices, &wound, options.mesh_spacing, options.seed, &mut warnings);
+        let mut used = used.into_iter();
+        vertices.retain(|p| used.next() == Some(true) && p.iter().all(|c| c.is_finite()));
     }
     let finite: Vec<bool> = points.iter().map(|p| p.coords.iter().all(|c| c.is_finite())).collect();
     dropped += keep(&mut points, &mut normals, &finite);
@@ -203,7 +209,7 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     let normals = (normals.len() == points.len())
         .then(|| normals.into_iter().map(unit).collect::<Option<Vec<_>>>())
         .flatten();
-    Ok(RawScan { points, normals, inside, viewpoint, dropped, warnings })
+    Ok(RawScan { points, vertices, normals, inside, viewpoint, dropped, warnings })
 }
 
 /// The factor to metres: the user's, else 1, as what the columns say is in the points by now.
