@@ -194,7 +194,14 @@ fn given_poses_are_planned_as_ever() {
         trials: 10,
         seed: 1,
     };
-    let outcome = task::run(&Robot::pr2(), &common::dome(), &Scene::of_obstacles(Vec::new()), &config, &Silent).expect("a plan");
+    let outcome = task::run(
+        &Robot::pr2(),
+        &common::dome(),
+        &Scene::of_obstacles(Vec::new()),
+        &config,
+        &Silent,
+    )
+    .expect("a plan");
     assert_golden(
         &[("dome".into(), outcome.plan.digest().expect("short enough"))],
         &[("dome", 0xb916e2324f907aff)],

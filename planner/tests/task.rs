@@ -6,8 +6,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options};
-use nullsweep_planner::progress::Silent;
 use nullsweep_planner::plan::Profile;
+use nullsweep_planner::progress::Silent;
 use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome, Tolerance};
 use nullsweep_planner::verify::{Given, verify};
 use nullsweep_planner::workcell::{Scene, Stance};

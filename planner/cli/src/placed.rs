@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
 use clap::Args;
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use nullsweep_planner::progress::Progress;
 use nullsweep_surface::room;
 use nullsweep_surface::scan::ScanWarning;
@@ -142,8 +142,11 @@ fn together(
     // What is lowest of all files rests on the support.
     let whole = match placement {
         Placement::Up { .. } if files.len() > 1 => {
-            let points = files.iter().flat_map(|(_, raw)| raw.anchors().iter().copied()).collect();
-            &RawScan { points, vertices: Vec::new(), normals: None, ..first.clone() }
+            let all = |of: fn(&RawScan) -> &[Point3<f64>]| {
+                files.iter().flat_map(|(_, raw)| of(raw).iter().copied()).collect()
+            };
+            let (points, vertices) = (all(|raw| &raw.points), all(RawScan::anchors));
+            &RawScan { points, vertices, normals: None, ..first.clone() }
         }
         _ => first,
     };

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
 use anyhow::Context;
+use clap::Args;
 use nalgebra::Isometry3;
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
@@ -140,8 +140,7 @@ impl TaskArgs {
             return Ok(scene(&self.around, None, &self.scans, self.seed, bars)?.in_the_way());
         }
         let floor = self.floor.unwrap_or_else(|| {
-            let floor =
-                task::floor_under(poses, tool, self.robot.collision().margins.environment);
+            let floor = task::floor_under(poses, tool, self.robot.collision().margins.environment);
             bars.note(&format!(
                 "the floor is taken to be at z = {floor:.3} m: --floor says where it is"
             ));
@@ -219,10 +218,7 @@ fn rows(f: &TaskFigures) -> Vec<[String; 2]> {
         ["task time".to_owned(), format!("{:.2} s", f.task_time_s)],
         ["beyond the tolerance, max".to_owned(), format!("{:.1e}", f.excess_max)],
         ["edge deviation, p90, max".to_owned(), deviation],
-        [
-            "violations".to_owned(),
-            violations(f.violations, &f.against.guessed_links),
-        ],
+        ["violations".to_owned(), violations(f.violations, &f.against.guessed_links)],
         ["  against".to_owned(), held_against(&f.against)],
         ["calculation".to_owned(), format!("{:.2} s", f.calc_time_s)],
         ["verification".to_owned(), format!("{:.2} s", f.verify_time_s)],

@@ -3,6 +3,7 @@
 
 mod jump;
 pub mod layered;
+mod memo;
 mod mover;
 mod retreat;
 mod rrt_connect;
@@ -10,6 +11,7 @@ mod rrt_connect;
 mod tests;
 
 pub use jump::{jump, reconfigure};
+pub use memo::Memo;
 pub use mover::{Leg, Mover, lift_cost};
 pub use retreat::{lift, retract};
 pub use rrt_connect::{Options as RrtOptions, rrt_connect};

@@ -99,7 +99,9 @@ impl<C: Cost> Completion<'_, C> {
                 if open < worth {
                     continue;
                 }
-                let Some(at) = self.visit_somewhere(attempt, &patch, worth, &left) else { continue };
+                let Some(at) = self.visit_somewhere(attempt, &patch, worth, &left) else {
+                    continue;
+                };
                 gained = true;
                 let legs = if self.stroke(attempt, at) { at + 1..at + 2 } else { at..at + 1 };
                 attempt.sequence.visits[legs].iter().for_each(|v| self.sweep(&v.leg, &mut left));
@@ -137,7 +139,8 @@ impl<C: Cost> Completion<'_, C> {
             };
             let SurfacePoint { point: centre, normal } = foot;
             let beside = Patch { centre, normal, points: Vec::new(), rmse: 0.0 };
-            attempt.patches.push(bed.raised(beside));
+            let Some(beside) = bed.laid(beside) else { return false };
+            attempt.patches.push(beside);
             let Some((sample, motion)) = self.insertion(attempt).reach_from(at) else {
                 attempt.patches.pop();
                 return false;
@@ -150,11 +153,11 @@ impl<C: Cost> Completion<'_, C> {
 
     /// The search for motions to the last patch.
     fn insertion<'a>(&'a self, attempt: &'a Attempt) -> Insertion<'a, C> {
-        let Planning { cell, job, start, .. } = *self.planning;
+        let Planning { cell, job, start, ref memo, .. } = *self.planning;
         Insertion {
             planning: self.planning,
             cost: self.cost,
-            mover: Mover::new(cell, &attempt.graph, &[], self.cost, start, job.seed),
+            mover: Mover::new(cell, &attempt.graph, &[], self.cost, start, memo, job.seed),
             patches: &attempt.patches,
             visits: &attempt.sequence.visits,
             patch: attempt.patches.len() - 1,
@@ -203,7 +206,8 @@ impl<C: Cost> Completion<'_, C> {
         let Planning { bed, scan, job, .. } = *self.planning;
         let turn = |k: usize| std::f64::consts::TAU * k as f64 / ASIDE as f64;
         let half = 0.5 * job.tool.width;
-        let aside = SHIFTS.iter().flat_map(|share| (0..ASIDE).map(move |k| (share * half, turn(k))));
+        let aside =
+            SHIFTS.iter().flat_map(|share| (0..ASIDE).map(move |k| (share * half, turn(k))));
         let feet = std::iter::once((0.0, 0.0)).chain(aside).filter_map(|(far, to)| {
             let at = patch.centre + direction(&patch.normal, to) * far;
             bed.surface().project(&at, &patch.normal)
@@ -214,12 +218,11 @@ impl<C: Cost> Completion<'_, C> {
                 UnitVector3::new_normalize(normal.scale(TILT.cos()) + aside)
             });
             let normals = std::iter::once(normal).chain(tilted);
-            normals.map(move |normal| bed.raised(Patch { centre, normal, ..patch.clone() }))
+            normals.filter_map(move |normal| bed.laid(Patch { centre, normal, ..patch.clone() }))
         });
         let swept = |place: Patch| {
-            let of = |i: &&u32| {
-                left[**i as usize] && coverage::sweeps(scan, **i, &place, &job.tool)
-            };
+            let of =
+                |i: &&u32| left[**i as usize] && coverage::sweeps(scan, **i, &place, &job.tool);
             (patch.points.iter().filter(of).count(), place)
         };
         let mut found: Vec<(usize, Patch)> = std::iter::once(patch.clone())

@@ -189,7 +189,12 @@ impl Setting {
         let reached = reach(self.cell(job), &self.patches, job.ik_samples, &|| ());
         let points = self.patches.iter().zip(&reached).filter(|(_, r)| r.is_some());
         let points: usize = points.map(|(patch, _)| patch.points.len()).sum();
-        (points > 0).then_some(Open { setting: self, reached, most: points * (1 + WELL_JOINED), stands })
+        (points > 0).then_some(Open {
+            setting: self,
+            reached,
+            most: points * (1 + WELL_JOINED),
+            stands,
+        })
     }
 
     /// Points of reached patches, each weighed by the edges that lead on from its patch, up to

@@ -28,7 +28,9 @@ pub enum TaskError {
         why: String,
     },
     /// No way leads from the start to any pose.
-    #[error("no motion through free space was found from the start to any of the {met} poses that the arm meets")]
+    #[error(
+        "no motion through free space was found from the start to any of the {met} poses that the arm meets"
+    )]
     NoWay {
         /// How many there are.
         met: usize,

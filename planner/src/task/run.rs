@@ -116,7 +116,8 @@ fn starts(arm: &Arm, world: &World, q: &JointVector) -> Result<(), TaskError> {
     let outside = |((low, high), q): (&(f64, f64), &f64)| !(*low..=*high).contains(q);
     let why = limits.into_iter().find_map(|((limit, q), name)| {
         let (low, high) = limit;
-        outside((limit, q)).then(|| format!("{name} is at {q:.4}, its range is {low:.4} to {high:.4}"))
+        outside((limit, q))
+            .then(|| format!("{name} is at {q:.4}, its range is {low:.4} to {high:.4}"))
     });
     let hit = || world.why_not(q, ToolContact::Allowed).map(|hit| hit.to_string());
     why.or_else(hit).map_or(Ok(()), |why| Err(TaskError::Start { why }))
