@@ -6,18 +6,26 @@ use std::sync::{Mutex, PoisonError};
 use nullsweep_robot::{JointVector, MAX_DOF};
 
 use super::layered::Motion;
-use super::mover::Leg;
+use super::leg::Leg;
 use crate::roadmap::Blocked;
 use crate::workcell::Sample;
 
 /// Motions of one arm in one workcell, at one cost and with one seed. Whatever makes a motion
 /// depends on its [`Key`] alone, so a plan is the same with it as without.
-#[derive(Default)]
 pub struct Memo {
+    pub(super) seed: u64,
     /// Along the surface, the redundancy parameter changing evenly.
     pub(super) tracks: Table<Result<Motion<Leg>, Blocked>>,
     /// All others.
     pub(super) ways: Table<Option<Motion<Leg>>>,
+}
+
+impl Memo {
+    /// Nothing was made yet.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        Self { seed, tracks: Table::default(), ways: Table::default() }
+    }
 }
 
 /// What a motion is made from.

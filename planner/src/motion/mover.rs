@@ -1,42 +1,16 @@
 //! The motions between two tool poses, as the layered search asks for them.
 
-use nalgebra::Point3;
 use nullsweep_robot::JointVector;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::jump::jump;
 use super::layered::{Link, Motion, Moves};
+use super::leg::Leg;
 use super::memo::{How, Key, Memo};
 use super::retreat::lift;
 use crate::cost::{self, Cost};
 use crate::roadmap::{Blocked, Edge, Graph, ToolPath, Track};
 use crate::workcell::{Sample, Workcell};
-
-/// A joint path into a stop.
-#[derive(Clone, Debug)]
-pub struct Leg {
-    /// Joint vectors from where the arm was to the stop's sample. \[rad\] or \[m\]
-    pub joints: Vec<JointVector>,
-    /// For each of them the planned pad centre while the pad is on the surface, root frame. \[m\]
-    pub line: Vec<Option<Point3<f64>>>,
-}
-
-impl Leg {
-    /// Whether it leaves the surface.
-    #[must_use]
-    pub fn is_jump(&self) -> bool {
-        self.line.iter().any(Option::is_none)
-    }
-
-    /// The same way back.
-    #[must_use]
-    pub fn reversed(&self) -> Self {
-        let mut back = self.clone();
-        back.joints.reverse();
-        back.line.reverse();
-        back
-    }
-}
 
 /// Makes motions in a workcell and prices them.
 pub struct Mover<'a, C> {
@@ -50,7 +24,6 @@ pub struct Mover<'a, C> {
     /// Added to every jump, so that the tool does not leave the surface for a trifle: see
     /// [`lift_cost`].
     lift: f64,
-    seed: u64,
 }
 
 /// Joints whose motion is what a jump adds.
@@ -68,7 +41,7 @@ pub fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
 
 impl<'a, C: Cost> Mover<'a, C> {
     /// For a tour over the patches `stops` and an arm that stands at `source` before the first motion.
-    /// `memo` is of the same workcell, cost and seed.
+    /// `memo` is of the same workcell and cost, and has the seed of every random choice.
     #[must_use]
     pub fn new(
         cell: Workcell<'a>,
@@ -77,10 +50,9 @@ impl<'a, C: Cost> Mover<'a, C> {
         cost: &'a C,
         source: JointVector,
         memo: &'a Memo,
-        seed: u64,
     ) -> Self {
         let lift = lift_cost(cost, cell.arm.dof());
-        Self { cell, graph, stops, cost, source, memo, lift, seed }
+        Self { cell, graph, stops, cost, source, memo, lift }
     }
 
     /// The motion along an edge, or `reversed` back, free of collision; `None` where the branch
@@ -114,7 +86,7 @@ impl<'a, C: Cost> Mover<'a, C> {
         for value in from.iter().chain(to) {
             bytes.extend_from_slice(&value.to_bits().to_le_bytes());
         }
-        xxh3_64_with_seed(&bytes, self.seed)
+        xxh3_64_with_seed(&bytes, self.memo.seed)
     }
 }
 

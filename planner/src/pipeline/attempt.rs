@@ -180,7 +180,7 @@ impl TourContext<'_> {
             tour.par_iter().map(|stop| self.layer(stop, &values)).collect();
         let stops: Vec<usize> = tour.iter().map(|stop| stop.patch).collect();
         let memo = &self.planning.memo;
-        let mover = Mover::new(cell, self.graph, &stops, cost, start, memo, job.seed);
+        let mover = Mover::new(cell, self.graph, &stops, cost, start, memo);
         let mut dropped = Vec::new();
         let path = layered::shortest(cost, continuous, &start, &layers, &mover, &mut |layer| {
             dropped.push(stops[layer]);

@@ -157,7 +157,7 @@ impl<C: Cost> Completion<'_, C> {
         Insertion {
             planning: self.planning,
             cost: self.cost,
-            mover: Mover::new(cell, &attempt.graph, &[], self.cost, start, memo, job.seed),
+            mover: Mover::new(cell, &attempt.graph, &[], self.cost, start, memo),
             patches: &attempt.patches,
             visits: &attempt.sequence.visits,
             patch: attempt.patches.len() - 1,

@@ -103,7 +103,7 @@ pub fn run(
         to_sweep: &points_of(scan, &patches, &reachable),
         already: &already,
         progress,
-        memo: Memo::default(),
+        memo: Memo::new(job.seed),
     };
     let best = search(&planning, patches, samples, &mut clock)?;
     let Attempt { patches, graph, sequence, mut plan, .. } = best;
