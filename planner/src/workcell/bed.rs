@@ -278,27 +278,22 @@ mod tests {
 
     #[test]
     fn a_patch_faces_what_is_under_it_where_it_comes_to_lie_or_is_none() {
-        // One point leans by 50°: beside a ridge the pad is raised off it, onto its upright neighbours.
-        let mut scene = ridge(0.013);
+        // One point of a floor leans by 50°.
+        let mut scene = ridge(0.0);
         let at = Point3::new(0.04, 0.0, 0.0);
-        let near = |p: &Point3<f64>| (p - at).norm();
-        let points = &scene.surface.points;
-        let leaning =
-            (0..points.len()).min_by(|&a, &b| near(&points[a]).total_cmp(&near(&points[b])));
-        let leaning = leaning.expect("a floor has points");
+        let leans = |p: &Point3<f64>| (p - at).norm() < 0.002;
+        let leaning = scene.surface.points.iter().position(leans).expect("a floor has points");
         let aslant = Vector3::new(0.0, 50f64.to_radians().sin(), 50f64.to_radians().cos());
-        let patch = |normal| Patch { centre: at, normal, points: Vec::new(), rmse: 0.0 };
-        let bed = Bed::new(&scene, &laid());
-        let up = UnitVector3::new_normalize(Vector3::z());
-        let upright = bed.laid(patch(up)).expect("an even floor carries the pad");
-        assert!(upright.centre.z > 0.003 && bed.faces(&upright.centre, &upright.normal));
         scene.surface.normals[leaning] = UnitVector3::new_normalize(aslant);
-        let bed = Bed::new(&scene, &laid());
-        let found = bed.laid(patch(up));
-        let faces = |p: &Patch| bed.faces(&p.centre, &p.normal);
-        assert!(found.as_ref().is_none_or(faces), "{found:?}");
-        let hole = Patch { centre: Point3::new(0.0, 0.5, 0.0), ..patch(up) };
-        assert_eq!(bed.laid(hole), None);
+        let up = UnitVector3::new_normalize(Vector3::z());
+        let patch = |centre| Patch { centre, normal: up, points: Vec::new(), rmse: 0.0 };
+        let pressed = Tool { stand_off: -0.004, ..Tool::default() };
+        let bed = Bed::new(&scene, &pressed);
+        // By its own normal the pad would face that point, but not what is under its pressed centre.
+        assert_eq!(bed.laid(patch(at)), None);
+        let beside = bed.laid(patch(Point3::new(0.04, 0.012, 0.0))).expect("an even floor");
+        assert!(bed.faces(&beside.centre, &beside.normal));
+        assert_eq!(bed.laid(patch(Point3::new(0.0, 0.5, 0.0))), None, "over nothing");
     }
 
     #[test]
