@@ -98,12 +98,12 @@ fn the_seat_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0x2eeab4a3eeff391c),
-                ("tsp acceleration", 0x78a99c47ea7c23fa),
-                ("curvature velocity", 0x6f0909e9a3008231),
-                ("curvature acceleration", 0xe709fb5f563c4054),
-                ("joint velocity", 0x9e93ea69b9ccfeb8),
-                ("joint acceleration", 0xd385f9b7c328bbba),
+                ("tsp velocity", 0xce4cef6d73169511),
+                ("tsp acceleration", 0x22918062fa63ee03),
+                ("curvature velocity", 0xd7dba59e71698725),
+                ("curvature acceleration", 0x514df74dc2e8c037),
+                ("joint velocity", 0x48b7ec7831c6cf40),
+                ("joint acceleration", 0x56a121d17511238f),
             ],
         );
     }
@@ -117,12 +117,12 @@ fn the_chair_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0xd67a3147127364b4),
-                ("tsp acceleration", 0x46a1d84d9db9ee2a),
-                ("curvature velocity", 0xe11d2a9385a3084f),
-                ("curvature acceleration", 0x1974ca278a8f8869),
-                ("joint velocity", 0x7e3259aca8e4aafa),
-                ("joint acceleration", 0xd68e33484aae97bd),
+                ("tsp velocity", 0x44e51d50bf12aaa6),
+                ("tsp acceleration", 0x969377efe33a3341),
+                ("curvature velocity", 0x7fac675f54ac956a),
+                ("curvature acceleration", 0xebc0983ba8d58a50),
+                ("joint velocity", 0x5a2d8c93950330bc),
+                ("joint acceleration", 0xaef10af33fb7a479),
             ],
         );
     }
@@ -136,12 +136,12 @@ fn the_car_is_planned_as_ever() {
         assert_golden(
             &found,
             &[
-                ("tsp velocity", 0xd563221236938c06),
-                ("tsp acceleration", 0xe8bc596091332690),
-                ("curvature velocity", 0xea1126b60d3586b0),
-                ("curvature acceleration", 0x0f6637868d25ac64),
-                ("joint velocity", 0x2ec975ce37c0a66b),
-                ("joint acceleration", 0xa0a0ed6738217b5e),
+                ("tsp velocity", 0x43513ffa38fc1f68),
+                ("tsp acceleration", 0x02d5d08f6c3f9435),
+                ("curvature velocity", 0x180a2d761febee69),
+                ("curvature acceleration", 0x7c1a178124cbb9ee),
+                ("joint velocity", 0xf1e9ebc7ec3984b3),
+                ("joint acceleration", 0x2558822b0284227d),
             ],
         );
     }
@@ -171,7 +171,7 @@ fn a_stance_is_chosen_as_ever() {
         let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
         assert_golden(
             &[("left arm".into(), outcome.plan.digest().expect("short enough"))],
-            &[("left arm", 0xbd857868aafcd355)],
+            &[("left arm", 0x3a17fec671fe1a5c)],
         );
     }
 }
@@ -185,15 +185,23 @@ fn given_poses_are_planned_as_ever() {
         arm: ArmSpec::pr2(Side::Right),
         tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
         tolerance: Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]),
-        held: Vec::new(),
-        obstacles: Vec::new(),
+        stance: Stance { base: [0.0; 3], held: Vec::new() },
+        start: None,
+        profile: Profile::Velocity,
         collision: Options::default(),
         v_max: None,
         rounds: 2,
         trials: 10,
         seed: 1,
     };
-    let outcome = task::run(&Robot::pr2(), &common::dome(), &config, &Silent).expect("a plan");
+    let outcome = task::run(
+        &Robot::pr2(),
+        &common::dome(),
+        &Scene::of_obstacles(Vec::new()),
+        &config,
+        &Silent,
+    )
+    .expect("a plan");
     assert_golden(
         &[("dome".into(), outcome.plan.digest().expect("short enough"))],
         &[("dome", 0xb916e2324f907aff)],
@@ -226,7 +234,7 @@ fn another_arm_is_planned_as_ever() {
         let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
         assert_golden(
             &[("panda".into(), outcome.plan.digest().expect("short enough"))],
-            &[("panda", 0x6d2e670507489a42)],
+            &[("panda", 0x5233badc42790b25)],
         );
     }
 }

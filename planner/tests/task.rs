@@ -4,11 +4,14 @@ mod common;
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Vector3};
-use nullsweep_collision::Options;
+use nalgebra::{Isometry3, Point3, Vector3};
+use nullsweep_collision::{Obstacle, ObstacleShape, Options};
+use nullsweep_planner::plan::Profile;
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::task::{self, TaskConfig, TaskOutcome, Tolerance};
-use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
+use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome, Tolerance};
+use nullsweep_planner::verify::{Given, verify};
+use nullsweep_planner::workcell::{Scene, Stance};
+use nullsweep_robot::{ArmSpec, Geometry, Robot, Side, Tool};
 
 fn config(tolerance: Tolerance) -> TaskConfig {
     TaskConfig {
@@ -16,8 +19,9 @@ fn config(tolerance: Tolerance) -> TaskConfig {
         // Poses of the gripper's tool frame, its x axis ahead.
         tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
         tolerance,
-        held: Vec::new(),
-        obstacles: Vec::new(),
+        stance: Stance { base: [0.0; 3], held: Vec::new() },
+        start: None,
+        profile: Profile::Velocity,
         collision: Options::default(),
         v_max: None,
         rounds: 2,
@@ -26,8 +30,13 @@ fn config(tolerance: Tolerance) -> TaskConfig {
     }
 }
 
+/// Not even a floor.
+fn nothing() -> Scene {
+    Scene::of_obstacles(Vec::new())
+}
+
 fn plan(tolerance: Tolerance) -> TaskOutcome {
-    task::run(&Robot::pr2(), &common::dome(), &config(tolerance), &Silent).unwrap()
+    task::run(&Robot::pr2(), &common::dome(), &nothing(), &config(tolerance), &Silent).unwrap()
 }
 
 #[test]
@@ -61,15 +70,15 @@ fn a_seed_gives_the_same_plan() {
     let (one, two) = (plan(Tolerance::AXIS), plan(Tolerance::AXIS));
     assert_eq!(one.plan, two.plan);
     let other = TaskConfig { seed: 2, ..config(Tolerance::AXIS) };
-    let other = task::run(&Robot::pr2(), &common::dome(), &other, &Silent).unwrap();
+    let other = task::run(&Robot::pr2(), &common::dome(), &nothing(), &other, &Silent).unwrap();
     assert_ne!(one.plan.knots, other.plan.knots);
 }
 
 #[test]
 fn poses_out_of_reach_are_an_error() {
     let far = [Isometry3::translation(9.0, 0.0, 1.0)];
-    let result = task::run(&Robot::pr2(), &far, &config(Tolerance::AXIS), &Silent);
-    assert!(matches!(result, Err(task::TaskError::NothingMet { poses: 1 })), "{result:?}");
+    let result = task::run(&Robot::pr2(), &far, &nothing(), &config(Tolerance::AXIS), &Silent);
+    assert!(matches!(result, Err(TaskError::NothingMet { poses: 1 })), "{result:?}");
 }
 
 /// The wok of Wang and Gleicher (ICRA 2025), whose planner takes 42.2 rad.
@@ -88,9 +97,103 @@ fn the_wok_takes_less_than_forty_radians() {
         collision: Options { fit_capsules: Some(0.05), ..Options::default() },
         ..config("0.05,0.05,0,0,0,free".parse().unwrap())
     };
-    let outcome = task::run(&robot, &poses, &config, &Silent).unwrap();
+    let outcome = task::run(&robot, &poses, &nothing(), &config, &Silent).unwrap();
     let figures = &outcome.figures;
     assert_eq!(outcome.verification.violations, []);
     assert_eq!((figures.met, figures.reconfigurations), (209, 0));
     assert!(figures.movement_rad < 40.0, "{} rad", figures.movement_rad);
+}
+
+/// What the check of a plan says of it in a scene.
+fn verified(outcome: &TaskOutcome, scene: &Scene) -> usize {
+    let (robot, arm, collision) = (Robot::pr2(), ArmSpec::pr2(Side::Right), Options::default());
+    let given = Given { robot: &robot, arm: &arm, scene, collision: &collision };
+    verify(&outcome.plan, given, &|| ()).expect("it can be checked").violations.len()
+}
+
+/// A few points as a camera might see them, where the elbow is half-way along a plan.
+fn at_the_elbow(outcome: &TaskOutcome) -> Scene {
+    let robot = Robot::pr2();
+    let arm = robot.arm(&ArmSpec::pr2(Side::Right)).unwrap();
+    let elbow = robot.links().iter().position(|link| link.name == "r_elbow_flex_link").unwrap();
+    let mut links = vec![Isometry3::identity(); robot.links().len()];
+    arm.link_poses(&outcome.plan.knots[outcome.plan.knots.len() / 2].q, &mut links);
+    let at = Point3::from(links[elbow].translation.vector);
+    let points = (-4..=4).map(|i| at + Vector3::z() * (0.005 * f64::from(i)));
+    Scene { surroundings: points.collect(), ..nothing() }
+}
+
+#[test]
+fn what_was_scanned_is_in_the_way_of_given_poses() {
+    let free = plan(Tolerance::AXIS);
+    let scene = at_the_elbow(&free);
+    assert!(verified(&free, &scene) > 0, "the points are where the arm passes without them");
+    let config = config(Tolerance::AXIS);
+    let outcome = task::run(&Robot::pr2(), &common::dome(), &scene, &config, &Silent).unwrap();
+    assert_eq!(outcome.verification.violations, []);
+    assert_eq!(verified(&outcome, &scene), 0);
+    assert_eq!(outcome.figures.against.other_points, 9);
+    assert!(outcome.plan.is_of_poses());
+}
+
+#[test]
+fn a_scene_is_where_the_robot_does_not_stand() {
+    let base = [1.0, -2.0, 0.7];
+    let stance = Stance { base, held: Vec::new() };
+    let scene = at_the_elbow(&plan(Tolerance::AXIS)).transformed(&stance.pose());
+    let moved = TaskConfig { stance, ..config(Tolerance::AXIS) };
+    let outcome = task::run(&Robot::pr2(), &common::dome(), &scene, &moved, &Silent).unwrap();
+    assert_eq!(outcome.plan.base, base);
+    assert_eq!(verified(&outcome, &scene), 0);
+    // Standing in a wall is told.
+    let wall = Obstacle {
+        name: "wall".into(),
+        shape: ObstacleShape::Geometry(Geometry::Box { half_extents: Vector3::repeat(0.2) }),
+        pose: Isometry3::translation(1.0, -2.0, 0.3),
+        carries_robot: false,
+    };
+    let scene = Scene { obstacles: vec![wall], ..nothing() };
+    let result = task::run(&Robot::pr2(), &common::dome(), &scene, &moved, &Silent);
+    assert!(
+        matches!(&result, Err(TaskError::StanceHit { hit }) if hit.contains("wall")),
+        "{result:?}"
+    );
+}
+
+#[test]
+fn a_task_begins_where_the_arm_is_and_keeps_its_accelerations() {
+    let robot = Robot::pr2();
+    let arm = robot.arm(&ArmSpec::pr2(Side::Right)).unwrap();
+    let start = arm.home();
+    let from_home = TaskConfig {
+        start: Some(start),
+        profile: Profile::Acceleration,
+        ..config(Tolerance::AXIS)
+    };
+    let outcome = task::run(&robot, &common::dome(), &nothing(), &from_home, &Silent).unwrap();
+    assert_eq!(outcome.verification.violations, []);
+    let knots = &outcome.plan.knots;
+    assert_eq!((knots[0].q, knots[0].line), (start, None));
+    assert_eq!(outcome.plan.profile, Profile::Acceleration);
+    let contact = from_home.tool.contact_in_tip();
+    let met = knots.iter().filter_map(|knot| Some((knot, knot.patch?)));
+    let mut poses: Vec<u32> = met
+        .map(|(knot, pose)| {
+            let off = common::dome()[pose as usize].inverse() * arm.tip_pose(&knot.q) * contact;
+            assert!(off.translation.vector.norm() < 1e-6, "{off}");
+            pose
+        })
+        .collect();
+    poses.sort_unstable();
+    poses.dedup();
+    assert_eq!(poses.len(), 25);
+    // A start beyond a limit, or in the scene, is told.
+    let mut beyond = start;
+    beyond[3] = 0.2;
+    let beyond = TaskConfig { start: Some(beyond), ..config(Tolerance::AXIS) };
+    let result = task::run(&robot, &common::dome(), &nothing(), &beyond, &Silent);
+    assert!(
+        matches!(&result, Err(TaskError::Start { why }) if why.contains("r_elbow_flex_joint")),
+        "{result:?}"
+    );
 }

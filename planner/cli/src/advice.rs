@@ -126,6 +126,12 @@ fn task(error: &TaskError) -> Option<String> {
         TaskError::NothingMet { .. } => {
             Some("--arm BASE,TIP names the tip link; --floor says how high the floor is".into())
         }
+        TaskError::StanceHit { .. } => Some(
+            "--base says where in the scene the robot stands; space that no scan has seen counts as \
+             free with --unseen free"
+                .into(),
+        ),
+        TaskError::Start { .. } | TaskError::NoWay { .. } => Some("give another --start".into()),
         TaskError::Collision(error) => collision(error),
         _ => None,
     }

@@ -172,8 +172,11 @@ fn together(
     // What is lowest of all files rests on the support.
     let whole = match placement {
         Placement::Up { .. } if files.len() > 1 => {
-            let points = files.iter().flat_map(|(_, raw)| raw.points.iter().copied()).collect();
-            &RawScan { points, normals: None, ..first.clone() }
+            let all = |of: fn(&RawScan) -> &[Point3<f64>]| {
+                files.iter().flat_map(|(_, raw)| of(raw).iter().copied()).collect()
+            };
+            let (points, vertices) = (all(|raw| &raw.points), all(RawScan::anchors));
+            &RawScan { points, vertices, normals: None, ..first.clone() }
         }
         _ => first,
     };

@@ -12,7 +12,7 @@ use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
-use nullsweep_planner::verify::Verification;
+use nullsweep_planner::verify::{Against, Verification};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch, told};
 use nullsweep_report as report;
@@ -286,20 +286,8 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
     let (p, a) = (&v.press, &v.against);
     let pressed = (mm(p.press_p50_m), mm(p.press_p95_m), mm(p.press_max_m));
     let facing = (p.facing_p95_rad.to_degrees(), p.facing_max_rad.to_degrees());
-    let unseen = match a.unseen_points {
-        0 => "unseen space free".to_owned(),
-        n => format!("{n} of unseen space"),
-    };
     let found = violations(v.violations.len(), &a.guessed_links);
-    let obstacles = if a.obstacles == 1 { "obstacle" } else { "obstacles" };
-    let against = format!(
-        "{} points of the surface, {} others, {} raw, {unseen}, {} {obstacles}{}",
-        a.surface_points,
-        a.other_points,
-        a.raw_points,
-        a.obstacles,
-        a.but_for()
-    );
+    let against = held_against(a);
     let distance = (mm(v.scan_distance_p95_m), mm(v.scan_distance_max_m));
     let rows = [
         ("coverage of reachable points", percent(v.coverage_reachable)),
@@ -320,6 +308,23 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         |name: &str| !["line deviation, max", "violations", "  against"].contains(&name);
     let known = rows.into_iter().filter(|(name, _)| a.surface_points > 0 || !of_surface(name));
     known.map(|(name, value)| [name.to_owned(), value]).collect()
+}
+
+/// What the arm was held against, for people.
+pub(super) fn held_against(a: &Against) -> String {
+    let unseen = match a.unseen_points {
+        0 => "unseen space free".to_owned(),
+        n => format!("{n} of unseen space"),
+    };
+    let obstacles = if a.obstacles == 1 { "obstacle" } else { "obstacles" };
+    format!(
+        "{} points of the surface, {} others, {} raw, {unseen}, {} {obstacles}{}",
+        a.surface_points,
+        a.other_points,
+        a.raw_points,
+        a.obstacles,
+        a.but_for()
+    )
 }
 
 /// How many violations were found, and for how many links that is a guess.

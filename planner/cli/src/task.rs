@@ -2,22 +2,30 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
-use comfy_table::Table;
 use nalgebra::Isometry3;
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::task::{self, TaskConfig, TaskFigures, Tolerance};
+use nullsweep_planner::task::{self, TaskConfig, TaskFigures, TaskOutcome, Tolerance};
+use nullsweep_planner::workcell::{Scene, Stance};
+use nullsweep_report as report;
+use nullsweep_robot::{Arm, Robot, Tool};
 
 use crate::bars::Bars;
+use crate::choices::ProfileArg;
 use crate::exit::OK;
 use crate::json::write_json;
-use crate::numbers::{finite, velocity};
+use crate::numbers::{Held, Place, finite, velocity};
 use crate::output::{say, writable};
-use crate::plan::violations;
+use crate::picture::{Sitter, picture};
+use crate::plan::{held_against, violations};
+use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
+use crate::scene::{SceneArgs, scene};
 use crate::sheet::sheet;
+use crate::site::SiteArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct TaskArgs {
@@ -33,10 +41,35 @@ pub(super) struct TaskArgs {
     /// and radians or `free`.
     #[arg(long, value_name = "TOLERANCE", default_value = "0,0,0,0,0,free")]
     tolerance: Tolerance,
-    /// Height of the floor in the robot's root frame; without it 0, or just under the lowest pose
-    /// where that is lower. [m]
+    /// Scan files of what is around the arm, or one scene file that `planner scene` wrote: all that
+    /// was measured is in the way, but for the tool at a pose. The option may be given several times.
+    #[arg(long = "scene", value_name = "FILE")]
+    scans: Vec<PathBuf>,
+    #[command(flatten)]
+    around: SceneArgs,
+    /// Height of the floor in the robot's root frame, without a scene; else 0, or just under the lowest
+    /// pose where that is lower. [m]
     #[arg(long, value_name = "M", allow_hyphen_values = true, value_parser = finite)]
+    #[arg(conflicts_with = "scans")]
     floor: Option<f64>,
+    /// Where the robot stands in the scene's floor frame: x,y,yaw (in radians, or degrees with ° or deg
+    /// behind them). The poses are in its root frame all the same.
+    #[arg(long, value_name = "X,Y,YAW", default_value = "0,0,0", allow_hyphen_values = true)]
+    base: Place,
+    /// Height of the PR2's torso joint. [m]
+    #[arg(long, value_name = "M", value_parser = finite)]
+    torso: Option<f64>,
+    /// Position of another held joint: NAME=VALUE.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    held: Vec<Held>,
+    /// Where the arm starts: its joints, comma-separated; a posture by its name; or `measured`, where
+    /// the executor holds it. Without it the plan begins at the pose that comes first.
+    #[arg(long, value_name = "POSTURE", allow_hyphen_values = true)]
+    start: Option<PostureArg>,
+    /// How fast the plan goes along its path: at bang-bang velocity, or as fast as velocity and
+    /// acceleration allow, corners blended, at rest in every pose.
+    #[arg(long, value_enum, default_value = "velocity")]
+    profile: ProfileArg,
     /// One velocity for all joints, where the robot's own limits are higher. [rad/s]
     #[arg(long, value_parser = velocity)]
     v_max: Option<f64>,
@@ -55,10 +88,15 @@ pub(super) struct TaskArgs {
     /// Write every figure of the run as JSON to a file, or `-`.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write a page that shows the arm moving along the plan.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    site: SiteArgs,
 }
 
 pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
-    for out in [&args.out].into_iter().chain(&args.json) {
+    for out in [Some(&args.out), args.json.as_ref(), args.report.as_ref()].into_iter().flatten() {
         writable(out)?;
     }
     let bars = Bars::new();
@@ -69,52 +107,109 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
         bars.note(note);
     }
     let tool = args.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
-    let collision = args.robot.collision();
-    let floor = args.floor.unwrap_or_else(|| {
-        let floor = task::floor_under(&poses, &tool, collision.margins.environment);
-        bars.note(&format!(
-            "the floor is taken to be at z = {floor:.3} m: --floor says where it is"
-        ));
-        floor
-    });
+    let scene = args.scene(&poses, &tool, &bars)?;
+    let stance = args.stance();
+    let arm = stance.bind(&robot.arm(&args.robot.spec())?)?;
+    let start = |posture: &PostureArg| {
+        posture.resolve(&arm, &args.robot, args.site.site(), &bars).context("--start")
+    };
     let config = TaskConfig {
         arm: args.robot.spec(),
         tool,
         tolerance: args.tolerance,
-        held: Vec::new(),
-        obstacles: vec![Obstacle::floor(Isometry3::translation(0.0, 0.0, floor))],
-        collision,
+        start: args.start.as_ref().map(start).transpose()?,
+        stance,
+        profile: args.profile.into(),
+        collision: args.robot.collision(),
         v_max: args.v_max,
         rounds: args.rounds.max(1),
         trials: args.trials.max(1),
         seed: args.seed,
     };
-    let outcome = task::run(&robot, &poses, &config, &bars);
+    let outcome = task::run(&robot, &poses, &scene, &config, &bars);
     bars.clear();
     let outcome = outcome?;
-    let figures = &outcome.figures;
-    for note in &figures.notes {
-        bars.note(note);
-    }
-    let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
-    if let Some(path) = &args.json {
-        write_json(figures, path)?;
-    }
-    if !to_stdout {
-        say!("{}", table(figures));
-    }
-    let code = write_unless_broken(&outcome.plan, &outcome.verification.violations, &args.out)?;
-    if code == OK && !to_stdout {
-        say!("plan: {}", args.out.display());
-    }
-    Ok(code)
+    args.finish(&robot, &arm, &scene, &outcome, &bars)
 }
 
-fn table(f: &TaskFigures) -> Table {
-    let mut table = sheet(["figure", "value"]);
+impl TaskArgs {
+    /// What is around the arm, in the floor frame: with nothing scanned the floor alone.
+    fn scene(&self, poses: &[Isometry3<f64>], tool: &Tool, bars: &Bars) -> anyhow::Result<Scene> {
+        if !self.scans.is_empty() {
+            bars.stage("scan", None);
+            return Ok(scene(&self.around, None, &self.scans, self.seed, bars)?.in_the_way());
+        }
+        let floor = self.floor.unwrap_or_else(|| {
+            let floor = task::floor_under(poses, tool, self.robot.collision().margins.environment);
+            bars.note(&format!(
+                "the floor is taken to be at z = {floor:.3} m: --floor says where it is"
+            ));
+            floor
+        });
+        let floor = Obstacle::floor(Isometry3::translation(0.0, 0.0, floor));
+        Ok(Scene::of_obstacles(vec![floor]))
+    }
+
+    fn stance(&self) -> Stance {
+        Stance { base: self.base.0, held: crate::numbers::held(&self.held, self.torso) }
+    }
+
+    /// Writes what was asked for and prints the table.
+    fn finish(
+        &self,
+        robot: &Robot,
+        arm: &Arm,
+        scene: &Scene,
+        outcome: &TaskOutcome,
+        bars: &Bars,
+    ) -> anyhow::Result<u8> {
+        let figures = &outcome.figures;
+        for note in &figures.notes {
+            bars.note(note);
+        }
+        let code = write_unless_broken(&outcome.plan, &outcome.verification.violations, &self.out)?;
+        if let Some(path) = &self.report {
+            let data = picture(Sitter {
+                plans: std::slice::from_ref(&outcome.plan),
+                robot,
+                arm,
+                collision: &self.robot.collision(),
+                scene: Some(scene),
+                verification: Some(&outcome.verification),
+                flights: &[],
+                left_out: &[],
+                tables: vec![report::Table {
+                    title: "Figures".into(),
+                    columns: vec!["figure".into(), "value".into()],
+                    rows: rows(figures).into_iter().map(Vec::from).collect(),
+                }],
+                lines: Vec::new(),
+            })?;
+            report::write(path, &data)?;
+        }
+        if let Some(path) = &self.json {
+            write_json(figures, path)?;
+        }
+        let to_stdout = self.json.as_deref() == Some(std::path::Path::new("-"));
+        if !to_stdout {
+            let mut table = sheet(["figure", "value"]);
+            table.add_rows(rows(figures));
+            say!("{table}");
+        }
+        if code == OK && !to_stdout {
+            say!("plan: {}", self.out.display());
+            if let Some(path) = &self.report {
+                say!("report: {}", path.display());
+            }
+        }
+        Ok(code)
+    }
+}
+/// The figures as name and value, for people.
+fn rows(f: &TaskFigures) -> Vec<[String; 2]> {
     let mm = |metres: f64| format!("{:.2}", metres * 1e3);
     let deviation = format!("{}, {} mm", mm(f.edge_deviation_p90_m), mm(f.edge_deviation_max_m));
-    table.add_rows([
+    vec![
         ["poses, met".to_owned(), format!("{}, {}", f.poses, f.met)],
         ["joint movement (L2)".to_owned(), format!("{:.2} rad", f.movement_rad)],
         ["reconfigurations".to_owned(), f.reconfigurations.to_string()],
@@ -122,12 +217,9 @@ fn table(f: &TaskFigures) -> Table {
         ["task time".to_owned(), format!("{:.2} s", f.task_time_s)],
         ["beyond the tolerance, max".to_owned(), format!("{:.1e}", f.excess_max)],
         ["edge deviation, p90, max".to_owned(), deviation],
-        [
-            "violations, against itself and the floor".to_owned(),
-            violations(f.violations, &f.guessed_links),
-        ],
+        ["violations".to_owned(), violations(f.violations, &f.against.guessed_links)],
+        ["  against".to_owned(), held_against(&f.against)],
         ["calculation".to_owned(), format!("{:.2} s", f.calc_time_s)],
         ["verification".to_owned(), format!("{:.2} s", f.verify_time_s)],
-    ]);
-    table
+    ]
 }

@@ -57,7 +57,8 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     let robot = args.robot.robot()?;
     let seed = args.seed.unwrap_or(plan.seed);
     let mut scene = if let Some(file) = &args.scene_file {
-        let swept = plan.surface.first().map(|s| plan.base_pose() * Point3::from(s.point));
+        let first = plan.surface.first().filter(|_| !plan.is_of_poses());
+        let swept = first.map(|s| plan.base_pose() * Point3::from(s.point));
         let choice = swept.map_or_else(|| args.scene.clone(), |point| args.scene.or_at(point));
         scene(&choice, None, std::slice::from_ref(file), seed, &bars)?
     } else if args.demo.is_none() && args.scans.is_empty() {
@@ -65,7 +66,7 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     } else {
         scene(&args.scene, args.demo, &args.scans, seed, &bars)?
     };
-    if plan.surface.is_empty() {
+    if plan.surface.is_empty() || plan.is_of_poses() {
         scene = scene.in_the_way();
     }
     let (arm, collision) = (args.robot.spec(), args.robot.collision());

@@ -3,6 +3,8 @@
 
 mod jump;
 pub mod layered;
+mod leg;
+mod memo;
 mod mover;
 mod retreat;
 mod rrt_connect;
@@ -10,6 +12,8 @@ mod rrt_connect;
 mod tests;
 
 pub use jump::{jump, reconfigure};
-pub use mover::{Leg, Mover, lift_cost};
+pub use leg::Leg;
+pub use memo::Memo;
+pub use mover::{Mover, lift_cost};
 pub use retreat::{lift, retract};
 pub use rrt_connect::{Options as RrtOptions, rrt_connect};

@@ -1,41 +1,16 @@
 //! The motions between two tool poses, as the layered search asks for them.
 
-use nalgebra::Point3;
 use nullsweep_robot::JointVector;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::jump::jump;
 use super::layered::{Link, Motion, Moves};
+use super::leg::Leg;
+use super::memo::{How, Key, Memo};
 use super::retreat::lift;
 use crate::cost::{self, Cost};
 use crate::roadmap::{Blocked, Edge, Graph, ToolPath, Track};
 use crate::workcell::{Sample, Workcell};
-
-/// A joint path into a stop.
-#[derive(Clone, Debug)]
-pub struct Leg {
-    /// Joint vectors from where the arm was to the stop's sample. \[rad\] or \[m\]
-    pub joints: Vec<JointVector>,
-    /// For each of them the planned pad centre while the pad is on the surface, root frame. \[m\]
-    pub line: Vec<Option<Point3<f64>>>,
-}
-
-impl Leg {
-    /// Whether it leaves the surface.
-    #[must_use]
-    pub fn is_jump(&self) -> bool {
-        self.line.iter().any(Option::is_none)
-    }
-
-    /// The same way back.
-    #[must_use]
-    pub fn reversed(&self) -> Self {
-        let mut back = self.clone();
-        back.joints.reverse();
-        back.line.reverse();
-        back
-    }
-}
 
 /// Makes motions in a workcell and prices them.
 pub struct Mover<'a, C> {
@@ -45,10 +20,10 @@ pub struct Mover<'a, C> {
     stops: &'a [usize],
     cost: &'a C,
     source: JointVector,
+    memo: &'a Memo,
     /// Added to every jump, so that the tool does not leave the surface for a trifle: see
     /// [`lift_cost`].
     lift: f64,
-    seed: u64,
 }
 
 /// Joints whose motion is what a jump adds.
@@ -66,6 +41,7 @@ pub fn lift_cost<C: Cost>(cost: &C, dof: usize) -> f64 {
 
 impl<'a, C: Cost> Mover<'a, C> {
     /// For a tour over the patches `stops` and an arm that stands at `source` before the first motion.
+    /// `memo` is of the same workcell and cost, and has the seed of every random choice.
     #[must_use]
     pub fn new(
         cell: Workcell<'a>,
@@ -73,10 +49,10 @@ impl<'a, C: Cost> Mover<'a, C> {
         stops: &'a [usize],
         cost: &'a C,
         source: JointVector,
-        seed: u64,
+        memo: &'a Memo,
     ) -> Self {
         let lift = lift_cost(cost, cell.arm.dof());
-        Self { cell, graph, stops, cost, source, lift, seed }
+        Self { cell, graph, stops, cost, source, memo, lift }
     }
 
     /// The motion along an edge, or `reversed` back, free of collision; `None` where the branch
@@ -110,8 +86,13 @@ impl<'a, C: Cost> Mover<'a, C> {
         for value in from.iter().chain(to) {
             bytes.extend_from_slice(&value.to_bits().to_le_bytes());
         }
-        xxh3_64_with_seed(&bytes, self.seed)
+        xxh3_64_with_seed(&bytes, self.memo.seed)
     }
+}
+
+/// The patches that a way along an edge leads from and to.
+fn ends(edge: &Edge, reversed: bool) -> (usize, usize) {
+    if reversed { (edge.b, edge.a) } else { (edge.a, edge.b) }
 }
 
 impl<C: Cost> Moves for Mover<'_, C> {
@@ -131,8 +112,12 @@ impl<C: Cost> Moves for Mover<'_, C> {
         from: &Sample,
         to: &Sample,
     ) -> Result<Motion<Leg>, Blocked> {
-        let path = self.path(&self.graph.edges[edge], reversed, from, to);
-        self.cell.follow(&path, from, to).map(|track| self.leg(track))
+        let edge = &self.graph.edges[edge];
+        let (a, b) = ends(edge, reversed);
+        self.memo.tracks.get(Key::new(How::Surface(a, b), &from.q, to), || {
+            let path = self.path(edge, reversed, from, to);
+            self.cell.follow(&path, from, to).map(|track| self.leg(track))
+        })
     }
 
     fn around(
@@ -141,22 +126,28 @@ impl<C: Cost> Moves for Mover<'_, C> {
         from: &Sample,
         to: &Sample,
     ) -> Option<Motion<Leg>> {
-        self.along(&self.graph.edges[edge], reversed, from, to)
+        let edge = &self.graph.edges[edge];
+        let (a, b) = ends(edge, reversed);
+        let key = Key::new(How::Surface(a, b), &from.q, to);
+        self.memo.ways.get(key, || self.along(edge, reversed, from, to))
     }
 
     fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<Leg>> {
         let start = from.map_or(self.source, |s| s.q);
-        let joints = jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
-        let cost = self.lift + cost::of_path(self.cost, &joints);
-        let pad = self.cell.tool.on(self.cell.arm);
-        let mut line = vec![None; joints.len()];
-        if from.is_some() {
-            line[0] = Some(pad.centre(&joints[0]));
-        }
-        if let (Some(last), Some(q)) = (line.last_mut(), joints.last()) {
-            *last = Some(pad.centre(q));
-        }
-        Some(Motion { cost, path: Leg { joints, line } })
+        let how = if from.is_some() { How::Jump } else { How::Start };
+        self.memo.ways.get(Key::new(how, &start, to), || {
+            let joints = jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
+            let cost = self.lift + cost::of_path(self.cost, &joints);
+            let pad = self.cell.tool.on(self.cell.arm);
+            let mut line = vec![None; joints.len()];
+            if from.is_some() {
+                line[0] = Some(pad.centre(&joints[0]));
+            }
+            if let (Some(last), Some(q)) = (line.last_mut(), joints.last()) {
+                *last = Some(pad.centre(q));
+            }
+            Some(Motion { cost, path: Leg { joints, line } })
+        })
     }
 
     fn lifts(&self, at: &Sample) -> bool {

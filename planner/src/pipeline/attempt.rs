@@ -8,7 +8,7 @@ use super::clock::Clock;
 use super::error::PipelineError;
 use super::job::Job;
 use crate::cost::{Cost, Effort, TaskTime};
-use crate::motion::{Leg, Mover, layered};
+use crate::motion::{Leg, Memo, Mover, layered};
 use crate::plan::{Continues, CostKind, Method, Plan};
 use crate::progress::{Progress, left_out};
 use crate::roadmap::{Graph, Nodes, graph};
@@ -35,6 +35,8 @@ pub(super) struct Planning<'a> {
     /// The points that were swept before the plan begins.
     pub(super) already: &'a [bool],
     pub(super) progress: &'a dyn Progress,
+    /// Motions that were made before.
+    pub(super) memo: Memo,
 }
 
 /// A plan with what it was made from.
@@ -125,8 +127,7 @@ impl Planning<'_> {
         let epsilon = self.fill_in_radius();
         let config = PatchConfig { epsilon, min_points, ..self.job.patches.clone() };
         let found = patches::fill_in(self.scan, left, &config, self.job.tool.reach_angle);
-        let carried = found.into_iter().filter(|patch| self.bed.carries(patch));
-        carried.map(|patch| self.bed.raised(patch)).collect()
+        found.into_iter().filter_map(|patch| self.bed.laid(patch)).collect()
     }
 
     pub(super) fn fill_in_radius(&self) -> f64 {
@@ -178,7 +179,8 @@ impl TourContext<'_> {
         let layers: Vec<Vec<Sample>> =
             tour.par_iter().map(|stop| self.layer(stop, &values)).collect();
         let stops: Vec<usize> = tour.iter().map(|stop| stop.patch).collect();
-        let mover = Mover::new(cell, self.graph, &stops, cost, start, job.seed);
+        let memo = &self.planning.memo;
+        let mover = Mover::new(cell, self.graph, &stops, cost, start, memo);
         let mut dropped = Vec::new();
         let path = layered::shortest(cost, continuous, &start, &layers, &mover, &mut |layer| {
             dropped.push(stops[layer]);

@@ -5,11 +5,15 @@
 //! goes, a jump is put in between two stops that a jump joins anyway, or at the end, where it is
 //! the least detour (cheapest insertion).
 //!
+//! Where the pad cannot lie in the middle of what is left, or would not touch it there, it is moved
+//! and tilted as long as it still sweeps enough of it.
+//!
 //! A stop between two jumps would be a touch that sweeps nothing: it gets a stroke, a side trip to a
 //! place beside it.
 
 use std::collections::HashSet;
 
+use nalgebra::UnitVector3;
 use nullsweep_robot::JointVector;
 use nullsweep_surface::{Patch, SurfacePoint, patches};
 use rayon::prelude::*;
@@ -24,12 +28,12 @@ use crate::plan::CostKind;
 use crate::roadmap::Edge;
 use crate::sweep::coverage;
 use crate::tour::formulation::{Stop, pose};
-use crate::workcell::{Sample, direction, redundancies};
+use crate::workcell::{Sample, direction, reach, redundancies};
 
 /// Times that patches are put over what is left: a side trip may leave slivers of its own.
 const ROUNDS: usize = 3;
 /// Least area that is worth a side trip, as a share of what the pad covers at any heading.
-const WORTH: f64 = 0.1;
+const WORTH: f64 = 0.05;
 /// Stops nearby that a side trip is tried from.
 const STOPS: usize = 8;
 /// Samples that a side trip from one stop is tried to, nearest redundancy value first.
@@ -38,6 +42,14 @@ const TARGETS: usize = 12;
 const STROKES: [f64; 2] = [0.5, 0.15];
 /// Directions in which one is tried.
 const DIRECTIONS: usize = 8;
+/// How far from the middle of what is left the pad is tried, as shares of half its width.
+const SHIFTS: [f64; 2] = [0.45, 0.8];
+/// Directions in which it is moved, and in which it is tilted.
+const ASIDE: usize = 8;
+/// How far it is tilted. \[rad\]
+const TILT: f64 = 0.2;
+/// Places of the pad for one group of points that are looked at, those that sweep most of it first.
+const PLACES: usize = 32;
 /// Headings that a jump is tried to.
 const HEADINGS: usize = 4;
 /// Jumps that are tried to one patch, least detour first, so many side by side.
@@ -87,9 +99,7 @@ impl<C: Cost> Completion<'_, C> {
                 if open < worth {
                     continue;
                 }
-                attempt.patches.push(patch);
-                let Some(at) = self.visit(attempt) else {
-                    attempt.patches.pop();
+                let Some(at) = self.visit_somewhere(attempt, &patch, worth, &left) else {
                     continue;
                 };
                 gained = true;
@@ -129,7 +139,8 @@ impl<C: Cost> Completion<'_, C> {
             };
             let SurfacePoint { point: centre, normal } = foot;
             let beside = Patch { centre, normal, points: Vec::new(), rmse: 0.0 };
-            attempt.patches.push(bed.raised(beside));
+            let Some(beside) = bed.laid(beside) else { return false };
+            attempt.patches.push(beside);
             let Some((sample, motion)) = self.insertion(attempt).reach_from(at) else {
                 attempt.patches.pop();
                 return false;
@@ -142,11 +153,11 @@ impl<C: Cost> Completion<'_, C> {
 
     /// The search for motions to the last patch.
     fn insertion<'a>(&'a self, attempt: &'a Attempt) -> Insertion<'a, C> {
-        let Planning { cell, job, start, .. } = *self.planning;
+        let Planning { cell, job, start, ref memo, .. } = *self.planning;
         Insertion {
             planning: self.planning,
             cost: self.cost,
-            mover: Mover::new(cell, &attempt.graph, &[], self.cost, start, job.seed),
+            mover: Mover::new(cell, &attempt.graph, &[], self.cost, start, memo),
             patches: &attempt.patches,
             visits: &attempt.sequence.visits,
             patch: attempt.patches.len() - 1,
@@ -162,6 +173,66 @@ impl<C: Cost> Completion<'_, C> {
         for (left, swept) in left.iter_mut().zip(coverage::swept(scan, &poses, &job.tool)) {
             *left &= !swept;
         }
+    }
+
+    /// Puts visits into the sequence from which the pad sweeps enough of the patch's points that are
+    /// `left`: their first index.
+    fn visit_somewhere(
+        &self,
+        attempt: &mut Attempt,
+        patch: &Patch,
+        worth: usize,
+        left: &[bool],
+    ) -> Option<usize> {
+        let Planning { cell, job, .. } = *self.planning;
+        let mut places = self.places(patch, worth, left);
+        let reached = reach(cell, &places, job.ik_samples, &|| ());
+        let mut reached = reached.into_iter();
+        places.retain(|_| reached.next().is_some_and(|sample| sample.is_some()));
+        places.into_iter().find_map(|place| {
+            attempt.patches.push(place);
+            let at = self.visit(attempt);
+            if at.is_none() {
+                attempt.patches.pop();
+            }
+            at
+        })
+    }
+
+    /// Places of the pad in and around the middle of a patch, upright and tilted, where it sweeps at
+    /// least `worth` of the patch's points that are `left` at any heading, those where it sweeps most
+    /// first.
+    fn places(&self, patch: &Patch, worth: usize, left: &[bool]) -> Vec<Patch> {
+        let Planning { bed, scan, job, .. } = *self.planning;
+        let turn = |k: usize| std::f64::consts::TAU * k as f64 / ASIDE as f64;
+        let half = 0.5 * job.tool.width;
+        let aside =
+            SHIFTS.iter().flat_map(|share| (0..ASIDE).map(move |k| (share * half, turn(k))));
+        let feet = std::iter::once((0.0, 0.0)).chain(aside).filter_map(|(far, to)| {
+            let at = patch.centre + direction(&patch.normal, to) * far;
+            bed.surface().project(&at, &patch.normal)
+        });
+        let around = feet.flat_map(|SurfacePoint { point: centre, normal }| {
+            let tilted = (0..ASIDE).map(move |k| {
+                let aside = direction(&normal, turn(k)) * TILT.sin();
+                UnitVector3::new_normalize(normal.scale(TILT.cos()) + aside)
+            });
+            let normals = std::iter::once(normal).chain(tilted);
+            normals.filter_map(move |normal| bed.laid(Patch { centre, normal, ..patch.clone() }))
+        });
+        let swept = |place: Patch| {
+            let of =
+                |i: &&u32| left[**i as usize] && coverage::sweeps(scan, **i, &place, &job.tool);
+            (patch.points.iter().filter(of).count(), place)
+        };
+        let mut found: Vec<(usize, Patch)> = std::iter::once(patch.clone())
+            .chain(around)
+            .map(swept)
+            .filter(|(points, _)| *points >= worth)
+            .collect();
+        found.sort_by_key(|(points, _)| std::cmp::Reverse(*points));
+        found.truncate(PLACES);
+        found.into_iter().map(|(_, place)| place).collect()
     }
 
     /// Puts visits of the last patch into the sequence; their first index, `None` where no motion

@@ -15,6 +15,7 @@ use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
 use super::swept::{leave_out_swept, points_of, swept_before};
 use crate::cost;
+use crate::motion::Memo;
 use crate::plan::{Plan, Profile};
 use crate::progress::Progress;
 use crate::roadmap::Graph;
@@ -60,8 +61,7 @@ pub fn run(
     let patches = clock.time("patches", || {
         let found = patches::find(surface, &job.patches, job.seed);
         let bed = Bed::new(scene, &job.tool);
-        let carried = found.into_par_iter().filter(|patch| bed.carries(patch));
-        carried.map(|patch| bed.raised(patch)).collect::<Vec<_>>()
+        found.into_par_iter().filter_map(|patch| bed.laid(patch)).collect::<Vec<_>>()
     });
     if patches.is_empty() {
         return Err(PipelineError::NoPatches { points: surface.points.len() });
@@ -103,6 +103,7 @@ pub fn run(
         to_sweep: &points_of(scan, &patches, &reachable),
         already: &already,
         progress,
+        memo: Memo::new(job.seed),
     };
     let best = search(&planning, patches, samples, &mut clock)?;
     let Attempt { patches, graph, sequence, mut plan, .. } = best;

@@ -69,12 +69,25 @@ fn search(
         })
         .collect();
     let mut open = open.into_iter().filter_map(Result::transpose).collect::<Result<Vec<_>, _>>()?;
+    // Where the arm cannot begin where it would, it may be shut in: only if it can nowhere.
+    let mut makeshift: Option<Setting> = None;
     while let Some(best) = best_of(&open, job) {
-        let stance = open.remove(best).setting.stance;
-        let setting = Setting::new(robot, arm, scene, patches, job, stance)?;
-        if setting.stands(job) {
-            return Ok(setting);
+        let Open { setting, stands, .. } = open.remove(best);
+        if stands == Stands::Makeshift && makeshift.is_some() {
+            continue;
         }
+        let setting = Setting::new(robot, arm, scene, patches, job, setting.stance)?;
+        match setting.stands(job) {
+            Some(Stands::Ready) => return Ok(setting),
+            Some(Stands::Makeshift) if makeshift.is_none() => makeshift = Some(setting),
+            _ => {}
+        }
+        if makeshift.is_some() {
+            open.retain(|other| other.stands == Stands::Ready);
+        }
+    }
+    if let Some(setting) = makeshift {
+        return Ok(setting);
     }
     let why = match first {
         None => {
@@ -92,6 +105,16 @@ struct Open {
     reached: Vec<Option<Sample>>,
     /// What [`Setting::score`] is at most.
     most: usize,
+    stands: Stands,
+}
+
+/// How the arm can begin in a stance.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stands {
+    /// In the posture that it would be in.
+    Ready,
+    /// Only in another one, near it.
+    Makeshift,
 }
 
 /// The index of the setting with the best score, the earlier one of two that are alike. Those that
@@ -137,9 +160,13 @@ impl Setting {
         Workcell { arm: &self.arm, tool: &job.tool, world: &self.world }
     }
 
-    /// Whether neither body nor start posture collides.
-    fn stands(&self, job: &Job) -> bool {
-        start(job, &self.arm, &self.world).is_ok() && self.world.stance_hit().is_none()
+    /// How the arm can begin; `None` where the body collides, or the arm in every start posture.
+    fn stands(&self, job: &Job) -> Option<Stands> {
+        if self.world.stance_hit().is_some() {
+            return None;
+        }
+        let start = start(job, &self.arm, &self.world).ok()?;
+        Some(if start.is_makeshift { Stands::Makeshift } else { Stands::Ready })
     }
 
     /// What keeps the arm from everything.
@@ -158,13 +185,16 @@ impl Setting {
 
     /// What the stance reaches; `None` where body or start posture collide, or it is nothing.
     fn open(self, job: &Job) -> Option<Open> {
-        if !self.stands(job) {
-            return None;
-        }
+        let stands = self.stands(job)?;
         let reached = reach(self.cell(job), &self.patches, job.ik_samples, &|| ());
         let points = self.patches.iter().zip(&reached).filter(|(_, r)| r.is_some());
         let points: usize = points.map(|(patch, _)| patch.points.len()).sum();
-        (points > 0).then_some(Open { setting: self, reached, most: points * (1 + WELL_JOINED) })
+        (points > 0).then_some(Open {
+            setting: self,
+            reached,
+            most: points * (1 + WELL_JOINED),
+            stands,
+        })
     }
 
     /// Points of reached patches, each weighed by the edges that lead on from its patch, up to

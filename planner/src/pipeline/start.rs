@@ -20,6 +20,8 @@ pub(super) fn rest_before(job: &Job, arm: &Arm) -> Option<Rest> {
 /// Where the arm is before the first motion.
 pub(super) struct Start {
     pub(super) q: JointVector,
+    /// Whether that is another posture than would have been taken, as the arm collides there.
+    pub(super) is_makeshift: bool,
     /// What a user should know who did not say where the arm is.
     pub(super) note: Option<String>,
 }
@@ -33,11 +35,11 @@ pub(super) fn start(job: &Job, arm: &Arm, world: &World) -> Result<Start, Pipeli
         let knots = after.plan.knots.len();
         let knot = after.plan.knots.get(after.knot);
         let q = knot.ok_or(PipelineError::NoSuchKnot { knots, knot: after.knot })?.q;
-        return Ok(Start { q, note: None });
+        return Ok(Start { q, is_makeshift: false, note: None });
     }
     if let Some(q) = job.after.as_ref().and_then(|after| after.held).or(job.start) {
         check(arm, world, &q)?;
-        return Ok(Start { q, note: None });
+        return Ok(Start { q, is_makeshift: false, note: None });
     }
     let states = match &job.collision.srdf {
         Some(path) => collision::group_states(path).map_err(CollisionError::from)?,
@@ -47,14 +49,14 @@ pub(super) fn start(job: &Job, arm: &Arm, world: &World) -> Result<Start, Pipeli
     let (name, home) = named.unwrap_or(("home", arm.home()));
     let Err(error) = check(arm, world, &home) else {
         let note = named.map(|(name, _)| format!("the arm starts in the SRDF's posture {name}"));
-        return Ok(Start { q: home, note });
+        return Ok(Start { q: home, is_makeshift: false, note });
     };
     let Some(q) = nearest_free(arm, world, &home) else { return Err(error) };
     let joints: Vec<String> = q[..arm.dof()].iter().map(|v| format!("{v:.2}")).collect();
     let joints = joints.join(",");
     let note =
         format!("the arm cannot start at {name} ({error}): planned from joints {joints} instead");
-    Ok(Start { q, note: Some(note) })
+    Ok(Start { q, is_makeshift: true, note: Some(note) })
 }
 
 /// Inside the margined limits and free of collision.

@@ -15,4 +15,11 @@ impl Plan {
         let normals = self.surface.iter().map(|s| normal(s.normal)).collect();
         Scan { raw: points.clone(), points, normals, spacing: 0.0 }
     }
+
+    /// Whether it goes through given poses: what it keeps as its surface are their places, one each.
+    #[must_use]
+    pub fn is_of_poses(&self) -> bool {
+        let places = self.surface.iter().map(|s| s.point);
+        !self.surface.is_empty() && places.eq(self.patches.iter().copied())
+    }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 use nullsweep_robot::{Arm, Tool};
-use nullsweep_surface::{Grid, Scan};
+use nullsweep_surface::{Grid, Patch, Scan};
 
 use super::pads::contact_motion;
 use crate::plan::Trajectory;
@@ -34,6 +34,19 @@ pub fn swept(scan: &Scan, contact_poses: &[Isometry3<f64>], tool: &Tool) -> Vec<
     swept
 }
 
+/// Whether a pad that is led over the middle of a patch sweeps a point of the scan there, whatever its
+/// heading.
+#[must_use]
+pub fn sweeps(scan: &Scan, point: u32, patch: &Patch, tool: &Tool) -> bool {
+    let (point, normal) = (scan.points[point as usize], scan.normals[point as usize]);
+    let offset = point - patch.centre;
+    let height = offset.dot(&patch.normal);
+    let beside = (offset.norm_squared() - height * height).max(0.0).sqrt();
+    beside <= 0.5 * tool.width.min(tool.length)
+        && height.abs() <= tool.reach_normal
+        && normal.dot(&patch.normal) >= tool.reach_angle.cos()
+}
+
 /// For each point of the scan whether the pad has passed over it in one of the motions, see
 /// [`swept`].
 #[must_use]
@@ -54,4 +67,41 @@ pub fn swept_by<'a>(
 #[must_use]
 pub fn share(swept: &[bool]) -> f64 {
     swept.iter().filter(|s| **s).count() as f64 / swept.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, UnitVector3, Vector3};
+
+    use super::*;
+    use crate::workcell::{contact_pose, direction};
+
+    #[test]
+    fn what_counts_as_swept_at_any_heading_is_swept_at_any() {
+        // Waves of 6 mm, a point every 4 mm.
+        let at = |n: i32| 0.004 * f64::from(n) - 0.2;
+        let height = |x: f64| 0.006 * (x / 0.02).sin();
+        let points: Vec<Point3<f64>> = (0..10_000)
+            .map(|i| Point3::new(at(i % 100), at(i / 100), height(at(i % 100))))
+            .collect();
+        let slope = |p: &Point3<f64>| Vector3::new(-0.3 * (p.x / 0.02).cos(), 0.0, 1.0);
+        let normals = points.iter().map(|p| UnitVector3::new_normalize(slope(p))).collect();
+        let scan = Scan { raw: points.clone(), points, normals, spacing: 0.004 };
+        let tool = Tool::default();
+        for tilt in [0.0, 0.2] {
+            let normal = UnitVector3::new_normalize(Vector3::new(0.0, tilt, 1.0));
+            let centre = Point3::new(0.01, 0.02, 0.003);
+            let patch = Patch { centre, normal, points: Vec::new(), rmse: 0.0 };
+            let sure: Vec<u32> = (0..scan.points.len() as u32)
+                .filter(|&i| sweeps(&scan, i, &patch, &tool))
+                .collect();
+            assert!(sure.len() > 50, "{} points", sure.len());
+            for k in 0..12 {
+                let travel = direction(&normal, 0.5 * f64::from(k));
+                let pose = contact_pose(&centre, &normal, &travel, tool.stand_off);
+                let swept = swept(&scan, &[pose], &tool);
+                assert!(sure.iter().all(|&i| swept[i as usize]), "heading {k}");
+            }
+        }
+    }
 }

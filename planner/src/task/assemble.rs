@@ -8,22 +8,34 @@ use super::route::Route;
 use crate::plan::{Plan, PlanKnot, SurfaceSample};
 use crate::{cost, timing};
 
+/// Where a route leaves its poses: joint paths through free space.
+pub(super) struct Way {
+    /// From where the arm is to the first pose, if it is not said to be there.
+    pub(super) approach: Option<Vec<JointVector>>,
+    /// Between each pose and the next, where the arm does not go straight.
+    pub(super) edges: Vec<Option<Vec<JointVector>>>,
+}
+
 /// The route as a plan.
 pub(super) fn assemble(
     robot: &Robot,
     arm: &Arm,
     poses: &[Isometry3<f64>],
     route: &Route,
-    edges: &[Option<Vec<JointVector>>],
+    way: &Way,
     config: &TaskConfig,
 ) -> Plan {
     let knot = |q, line, patch| PlanKnot { time_ns: 0, q, v: JointVector::default(), line, patch };
     let mut knots: Vec<PlanKnot> = Vec::new();
     // Whole turns of continuous joints that the ways through free space have left out.
     let mut turns = JointVector::ZERO;
+    if let Some((last, approach)) = way.approach.as_ref().and_then(|path| path.split_last()) {
+        knots.extend(approach.iter().map(|q| knot(*q, None, None)));
+        turns = route.order.first().map_or(turns, |&pose| *last - route.points[pose].q);
+    }
     for (k, &pose) in route.order.iter().enumerate() {
         let point = &route.points[pose];
-        if let Some(through) = k.checked_sub(1).and_then(|e| edges[e].as_ref()) {
+        if let Some(through) = k.checked_sub(1).and_then(|e| way.edges[e].as_ref()) {
             let (first, last) = (through[0], through[through.len() - 1]);
             let between = &through[1..through.len() - 1];
             // A straight one too is marked as one that leaves the surface.
@@ -38,6 +50,7 @@ pub(super) fn assemble(
     }
     timing::set_times(&mut knots, &cost::velocities(arm, config.v_max));
     Plan {
+        base: config.stance.base,
         seed: config.seed,
         patches: poses.iter().map(|p| p.translation.vector.into()).collect(),
         surface: poses.iter().map(place).collect(),

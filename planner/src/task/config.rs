@@ -1,10 +1,12 @@
 //! What is to be planned through given poses.
 
 use nalgebra::{Isometry3, Vector3};
-use nullsweep_collision::{Obstacle, Options};
-use nullsweep_robot::{ArmSpec, Tool};
+use nullsweep_collision::Options;
+use nullsweep_robot::{ArmSpec, JointVector, Tool};
 
 use super::tolerance::Tolerance;
+use crate::plan::Profile;
+use crate::workcell::Stance;
 
 /// What is to be planned.
 #[derive(Clone, Debug)]
@@ -15,10 +17,12 @@ pub struct TaskConfig {
     pub tool: Tool,
     /// How near is met.
     pub tolerance: Tolerance,
-    /// Positions of joints outside the arm. \[rad\] or \[m\]
-    pub held: Vec<(String, f64)>,
-    /// Solid things, in the robot's root frame.
-    pub obstacles: Vec<Obstacle>,
+    /// Where the robot stands in the scene, and its held joints.
+    pub stance: Stance,
+    /// Where the arm is; `None`: at the pose that comes first. \[rad\] or \[m\]
+    pub start: Option<JointVector>,
+    /// How fast the plan goes along its path.
+    pub profile: Profile,
     /// Collision margins and meshes.
     pub collision: Options,
     /// One velocity for all joints; `None`: the robot's limits. \[rad/s\]

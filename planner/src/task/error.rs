@@ -15,6 +15,26 @@ pub enum TaskError {
     /// Collisions cannot be checked.
     #[error(transparent)]
     Collision(#[from] CollisionError),
+    /// The body stands in something.
+    #[error("the robot cannot stand there: {hit}")]
+    StanceHit {
+        /// What is too near to what.
+        hit: String,
+    },
+    /// The arm cannot be where it is said to be.
+    #[error("the arm cannot start where it is: {why}")]
+    Start {
+        /// The joint beyond its limits, or what is too near to what.
+        why: String,
+    },
+    /// No way leads from the start to any pose.
+    #[error(
+        "no motion through free space was found from the start to any of the {met} poses that the arm meets"
+    )]
+    NoWay {
+        /// How many there are.
+        met: usize,
+    },
     /// No joint vector was found for any pose.
     #[error(
         "none of the {poses} poses is met by the arm inside its limits and free of collision: are \

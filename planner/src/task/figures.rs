@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::verify::Against;
+
 /// Every figure of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TaskFigures {
@@ -33,8 +35,8 @@ pub struct TaskFigures {
     pub calc_time_s: f64,
     /// Verification. \[s\]
     pub verify_time_s: f64,
-    /// Links whose meshes are missing: capsules stand for them, a guess.
-    pub guessed_links: Vec<String>,
+    /// What the arm was held against.
+    pub against: Against,
     /// What was made up for the collision check.
     pub notes: Vec<String>,
 }

@@ -22,6 +22,10 @@ const UNEVEN: f64 = 0.025;
 const TILTS: [f64; 3] = [0.07, 0.14, 0.21];
 /// Directions of each.
 const TURNS: usize = 8;
+/// Places on each piece of a line at which the pad's facing is looked at. Pieces are some 6 mm long
+/// and points of a scan a few apart, so that none of those that come to lie under the pad's centre
+/// is passed over.
+const LOOKS: usize = 4;
 /// The pad is raised and let down no more steeply than this along its way.
 const STEEPEST: f64 = 0.25;
 
@@ -72,33 +76,42 @@ impl Bed {
         &self.surface
     }
 
-    /// Whether there is surface under the middle of a patch. On a sparse scan few points may make a
-    /// plane, and none of them be near its middle.
-    #[must_use]
-    pub fn carries(&self, patch: &Patch) -> bool {
-        self.surface.project(&patch.centre, &patch.normal).is_some()
-    }
-
     /// The patch as the pad comes to lie on it: where something presses it in too deep tilted so
     /// that this is least, then raised. Where the pad would not sweep the point under its centre, as
-    /// that lies too aslant, that point's normal takes the place of the patch's.
+    /// that lies too aslant, that point's normal takes the place of the patch's, or one near it.
+    ///
+    /// `None` where there is no surface under its middle (on a sparse scan few points may make a plane,
+    /// and none of them be near it), or the pad faces it in no way.
     #[must_use]
-    pub fn raised(&self, patch: Patch) -> Patch {
+    pub fn laid(&self, patch: Patch) -> Option<Patch> {
+        self.surface.project(&patch.centre, &patch.normal)?;
         let own = self.surface.normal_near(&patch.centre).unwrap_or(patch.normal);
+        let over = |normal| self.over(&SurfacePoint { point: patch.centre, normal }).max(0.0);
+        let raised = |normal: UnitVector3<f64>, over: f64| Patch {
+            centre: patch.centre + normal.scale(over.min(self.highest)),
+            normal,
+            ..patch.clone()
+        };
         let faces = |normal: &UnitVector3<f64>| self.faces(&patch.centre, normal);
         let upright = if faces(&patch.normal) { patch.normal } else { own };
-        let over = |normal| self.over(&SurfacePoint { point: patch.centre, normal });
-        let mut best = (over(upright).max(0.0), upright);
+        let mut best = (over(upright), upright);
         if best.0 > 0.0 {
             for normal in tilts(&upright).filter(faces) {
-                let over = over(normal).max(0.0);
+                let over = over(normal);
                 if over < best.0 - 1e-4 {
                     best = (over, normal);
                 }
             }
         }
-        let (over, normal) = best;
-        Patch { centre: patch.centre + normal.scale(over.min(self.highest)), normal, ..patch }
+        let stands = |patch: &Patch| self.faces(&patch.centre, &patch.normal);
+        let first = raised(best.1, best.0);
+        if stands(&first) {
+            return Some(first);
+        }
+        let others = tilts(&own).map(|normal| (over(normal), normal));
+        let others = others.map(|(over, normal)| (over, raised(normal, over)));
+        let least = others.filter(|(_, patch)| stands(patch)).min_by(|a, b| a.0.total_cmp(&b.0));
+        least.map(|(_, patch)| patch)
     }
 
     /// [`Surface::line`], raised between its ends. `None` too where the pad would not sweep the
@@ -143,12 +156,16 @@ impl Bed {
 
     /// Whether the pad would sweep the points under its centre.
     fn faces_along(&self, line: &[SurfacePoint]) -> bool {
-        line.windows(2).all(|w| {
-            let middle = nalgebra::center(&w[0].point, &w[1].point);
-            let between = w[0].normal.into_inner() + w[1].normal.into_inner();
-            self.faces(&middle, &UnitVector3::new_normalize(between))
-                && self.faces(&w[1].point, &w[1].normal)
-        })
+        let faces_first = line.first().is_none_or(|at| self.faces(&at.point, &at.normal));
+        faces_first
+            && line.windows(2).all(|w| {
+                let [a, b] = [w[0].normal.into_inner(), w[1].normal.into_inner()];
+                (1..=LOOKS).all(|look| {
+                    let share = look as f64 / LOOKS as f64;
+                    let point = w[0].point + (w[1].point - w[0].point) * share;
+                    self.faces(&point, &UnitVector3::new_normalize(a.lerp(&b, share)))
+                })
+            })
     }
 
     /// Whether a pad that is led through `point` would sweep what is there, and what is where its
@@ -257,6 +274,26 @@ mod tests {
             let found = Bed::new(&thing, &tool).lift(&flat(0.13), 0.0);
             assert!((found - lift).abs() < 1e-9, "{height} m: {found}");
         }
+    }
+
+    #[test]
+    fn a_patch_faces_what_is_under_it_where_it_comes_to_lie_or_is_none() {
+        // One point of a floor leans by 50°.
+        let mut scene = ridge(0.0);
+        let at = Point3::new(0.04, 0.0, 0.0);
+        let leans = |p: &Point3<f64>| (p - at).norm() < 0.002;
+        let leaning = scene.surface.points.iter().position(leans).expect("a floor has points");
+        let aslant = Vector3::new(0.0, 50f64.to_radians().sin(), 50f64.to_radians().cos());
+        scene.surface.normals[leaning] = UnitVector3::new_normalize(aslant);
+        let up = UnitVector3::new_normalize(Vector3::z());
+        let patch = |centre| Patch { centre, normal: up, points: Vec::new(), rmse: 0.0 };
+        let pressed = Tool { stand_off: -0.004, ..Tool::default() };
+        let bed = Bed::new(&scene, &pressed);
+        // By its own normal the pad would face that point, but not what is under its pressed centre.
+        assert_eq!(bed.laid(patch(at)), None);
+        let beside = bed.laid(patch(Point3::new(0.04, 0.012, 0.0))).expect("an even floor");
+        assert!(bed.faces(&beside.centre, &beside.normal));
+        assert_eq!(bed.laid(patch(Point3::new(0.0, 0.5, 0.0))), None, "over nothing");
     }
 
     #[test]

@@ -254,13 +254,14 @@ fn centroid(points: &[Point3<f64>]) -> Point3<f64> {
     Point3::from(sum / points.len().max(1) as f64)
 }
 
-/// Axis-aligned boxes in the root frame around the shapes that do not move with the arm.
+/// Axis-aligned boxes in the root frame around the shapes that do not move with the arm, and those of
+/// its first link, which turns in place.
 fn body_boxes(robot: &Robot, arm: &Arm) -> Vec<(Point3<f64>, Point3<f64>)> {
     let mut poses = vec![Isometry3::identity(); robot.links().len()];
     arm.link_poses(&arm.home(), &mut poses);
     let mut boxes = Vec::new();
     for (i, link) in robot.links().iter().enumerate() {
-        if arm.moving_links().contains(&i) {
+        if arm.moving_links().iter().skip(1).any(|moving| *moving == i) {
             continue;
         }
         boxes.extend(link.collisions.iter().filter_map(|shape| extent(&poses[i], shape)));

@@ -67,6 +67,8 @@ pub struct Surface {
     raw: Vec<Point3<f64>>,
     raw_normals: Vec<UnitVector3<f64>>,
     radius: f64,
+    /// Within which [`FIT_POINTS`] have to lie: the radius before noise widened it.
+    core: f64,
     raw_radius: f64,
     gap: f64,
     spacing: f64,
@@ -86,7 +88,7 @@ impl Surface {
         let normals: Vec<_> = order.iter().map(|&i| scan.normals[i as usize]).collect();
         let grid = Grid::new(&points, radius);
         let widening = (noise(&grid, &points, &normals, radius) / NOISE).sqrt();
-        let radius = radius * widening.clamp(1.0, WIDEST);
+        let (core, radius) = (radius, radius * widening.clamp(1.0, WIDEST));
         Self {
             grid: Grid::new(&points, radius),
             normals,
@@ -94,6 +96,7 @@ impl Surface {
             raw_normals: raw_order.iter().map(|&i| scan.normals[i as usize]).collect(),
             raw,
             radius,
+            core,
             raw_radius,
             gap: GAP.max(3.0 * scan.spacing),
             spacing: scan.spacing,
@@ -218,7 +221,7 @@ impl Surface {
             // Fading from 78° to 53°, as a hard bound would make the line jump.
             let agreement = ((self.normals[index as usize].dot(hint) - 0.2) / 0.4).clamp(0.0, 1.0);
             if agreement > 0.0 {
-                count += 1;
+                count += usize::from(squared <= self.core * self.core);
                 border = border.min(squared);
                 fit.add(position, agreement * weight(squared * scale));
             }

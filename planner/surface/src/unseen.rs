@@ -1,9 +1,10 @@
 //! What no view has seen: the space behind what was measured.
 //!
-//! Each sensor's measurements are sorted by direction. A place is *unseen* if it lies behind the
-//! farthest measurement in its direction, as some sensor sees it, and no sensor has looked through
-//! it. Directions without a measurement say nothing: a scan that was cropped would else be walled
-//! in.
+//! Each sensor's measurements are sorted by direction, into windows that overlap by half. A place is
+//! *unseen* if in one of the windows around its direction it lies behind all that was measured
+//! there, as some sensor sees it, and no sensor has looked through it. So the edge of what was seen
+//! is taken to be uncertain by a window, wherever their borders fall. Windows without a measurement
+//! say nothing: a scan that was cropped would else be walled in.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -23,12 +24,11 @@ const DEEPEST: f64 = 0.02;
 const DEPTH: f64 = DEEPEST - 0.5 * CELL;
 /// How far the unseen is looked at around the surface. \[m\]
 const AROUND: f64 = 0.6;
-/// Directions are told apart by this angle, and by no less than a few measurements. \[rad\]
-const DIRECTION: f64 = 0.5 * PI / 180.0;
-/// Measurements that a direction should have, across.
+/// Width of a window: directions are told apart by this angle, and by no less than a few
+/// measurements. \[rad\]
+const WINDOW: f64 = 0.5 * PI / 180.0;
+/// Measurements that a window should have, across.
 const ACROSS: f64 = 2.5;
-/// Directions around one without a measurement that make it a gap in what they saw.
-const RING: usize = 5;
 
 /// The border of the unseen space around a surface, as centres of cells 1 cm apart; nothing where
 /// no view has a known sensor. Below the floor (z = 0) is no space. \[m\]
@@ -74,11 +74,20 @@ struct Eye {
     at: Point3<f64>,
     /// Turns z into the middle of what it saw.
     turn: UnitQuaternion<f64>,
+    /// Side of the cells of directions: half a window. \[rad\]
     angle: f64,
     columns: usize,
-    /// Least and largest distance measured in each direction; the largest is 0 where there is none.
-    /// \[m\]
-    range: Vec<(f32, f32)>,
+    sight: Vec<Range>,
+}
+
+/// How far a sensor saw in a cell of directions. \[m\]
+#[derive(Clone, Copy)]
+struct Range {
+    /// The least distance measured in any window around it: what is nearer was looked through.
+    /// Infinite where nothing was measured.
+    nearest: f32,
+    /// Behind this some window around it saw nothing. Infinite where nothing was measured.
+    hidden: f32,
 }
 
 impl Eye {
@@ -89,22 +98,43 @@ impl Eye {
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &mean)?;
         let distances: f64 = view.points.iter().map(|p| (p - at).norm()).sum();
         let distance = distances / view.points.len().max(1) as f64;
-        let angle = DIRECTION.max(ACROSS * surface.spacing / distance.max(1e-3));
+        let angle = 0.5 * WINDOW.max(ACROSS * surface.spacing / distance.max(1e-3));
         let (columns, rows) = ((2.0 * PI / angle) as usize + 1, (PI / angle) as usize + 1);
-        let range = vec![(f32::INFINITY, 0.0); columns * rows];
-        let mut eye = Self { at, turn, angle, columns, range };
+        let mut eye = Self { at, turn, angle, columns, sight: Vec::new() };
+        // Least and largest distance in each cell, the largest 0 where there is none.
+        let mut seen = vec![(f32::INFINITY, 0.0_f32); columns * rows];
         for p in &view.points {
             let (direction, distance) = eye.look(p);
-            if let Some((least, most)) = eye.range.get_mut(direction) {
+            if let Some((least, most)) = seen.get_mut(direction) {
                 *least = least.min(distance);
                 *most = most.max(distance);
             }
         }
-        eye.close_gaps();
+        // A window is a cell, the next one, and the two below these.
+        let joined = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+        let window = |first: usize| {
+            [1, columns, columns + 1]
+                .iter()
+                .filter_map(|offset| seen.get(first + offset))
+                .fold(seen[first], |window, cell| joined(window, *cell))
+        };
+        let windows: Vec<(f32, f32)> = (0..seen.len()).map(window).collect();
+        let range = |cell: usize| {
+            let around = [0, 1, columns, columns + 1]
+                .into_iter()
+                .filter_map(|offset| Some(windows[cell.checked_sub(offset)?]))
+                .filter(|(_, most)| *most > 0.0);
+            let nothing = Range { nearest: f32::INFINITY, hidden: f32::INFINITY };
+            around.fold(nothing, |range, (least, most)| Range {
+                nearest: range.nearest.min(least),
+                hidden: range.hidden.min(most + DEPTH as f32),
+            })
+        };
+        eye.sight = (0..seen.len()).map(range).collect();
         Some(eye)
     }
 
-    /// The direction of a place, and its distance. \[m\]
+    /// The cell of a place's direction, and its distance. \[m\]
     fn look(&self, place: &Point3<f64>) -> (usize, f32) {
         let v = self.turn.inverse_transform_vector(&(place - self.at));
         let column = (v.x.atan2(v.z) + PI) / self.angle;
@@ -112,28 +142,11 @@ impl Eye {
         (row as usize * self.columns + column as usize, v.norm() as f32)
     }
 
-    /// Gives directions that saw nothing, but are surrounded by others that did, what those saw.
-    fn close_gaps(&mut self) {
-        let seen = self.range.clone();
-        let at = |i: usize, offset: isize| seen.get(i.checked_add_signed(offset)?).copied();
-        let columns = self.columns as isize;
-        let ring = [-columns - 1, -columns, -columns + 1, -1, 1, columns - 1, columns, columns + 1];
-        for (i, range) in self.range.iter_mut().enumerate().filter(|(_, r)| r.1 == 0.0) {
-            let around: Vec<_> =
-                ring.iter().filter_map(|&o| at(i, o)).filter(|r| r.1 > 0.0).collect();
-            if around.len() >= RING {
-                *range = around
-                    .iter()
-                    .fold((f32::INFINITY, 0.0), |(least, most), r| (least.min(r.0), most.max(r.1)));
-            }
-        }
-    }
-
     fn sees(&self, place: &Point3<f64>) -> Sight {
         let (direction, distance) = self.look(place);
-        match self.range.get(direction) {
-            Some(&(_, most)) if most > 0.0 && distance > most + DEPTH as f32 => Sight::Behind,
-            Some(&(least, _)) if distance < least => Sight::Through,
+        match self.sight.get(direction) {
+            Some(range) if distance > range.hidden => Sight::Behind,
+            Some(range) if range.nearest.is_finite() && distance < range.nearest => Sight::Through,
             _ => Sight::Nothing,
         }
     }
@@ -227,6 +240,24 @@ mod tests {
         let both = [&view, &below].map(|view| Eye::of(view, &surface).unwrap());
         assert!(!is_unseen(&both, &Point3::new(0.05, 0.05, 0.9)));
         assert!(!is_unseen(&both, &Point3::new(0.05, 0.05, 1.1)));
+    }
+
+    #[test]
+    fn the_edge_of_what_was_seen_does_not_depend_on_where_windows_begin() {
+        // Seen from two metres above, 4 mm are 0.11°; places a third of a window beside the edge.
+        for step in 0..40 {
+            let (mut view, surface) = plate(Some(Point3::new(0.0, 0.0, 3.0)));
+            let cut = -0.1 + 0.001 * f64::from(step);
+            view.points.retain(|p| p.x <= cut);
+            let eye = [Eye::of(&view, &surface).unwrap()];
+            let edge = view.points.iter().map(|p| p.x).fold(f64::MIN, f64::max);
+            let beside = |share: f64| {
+                let tangent = ((edge / 2.0).atan() + share * WINDOW).tan();
+                Point3::new(2.2 * tangent, 0.01, 0.8)
+            };
+            assert!(is_unseen(&eye, &beside(0.33)), "edge at {edge}");
+            assert!(!is_unseen(&eye, &beside(1.5)), "edge at {edge}");
+        }
     }
 
     #[test]

@@ -376,3 +376,19 @@ mod hostile_bytes {
         }
     }
 }
+
+#[test]
+fn a_mesh_stands_in_the_same_place_whatever_points_a_seed_lays_on_it() {
+    // A tetrahedron of half a metre, its corners on the floor but one.
+    let obj = b"v 0 0 0\nv 0.5 0 0\nv 0 0.4 0\nv 0 0 0.3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+    let placed = [1, 2].map(|seed| {
+        let options = ReadOptions { seed, mesh_spacing: 0.004, ..ReadOptions::default() };
+        let raw = scan::read_bytes(obj, Format::Obj, Path::new("wedge.obj"), &options).unwrap();
+        let up = Placement::Up { up: Vector3::z_axis(), support_height: 0.7 };
+        scan::place(&raw, &up).1
+    });
+    assert_eq!(placed[0], placed[1]);
+    // The mean of the corners over the origin, the lowest of them on the support.
+    let shift = placed[0].translation.vector;
+    assert!((shift - Vector3::new(-0.125, -0.1, 0.7)).norm() < 1e-12, "{shift}");
+}

@@ -67,6 +67,9 @@ pub struct PlacedScan {
     pub views: Vec<View>,
 }
 
+/// How much lower than its points a corner of a mesh may lie and still belong to them. \[m\]
+const FOOT: f64 = 0.01;
+
 /// Moves a scan into the floor frame. Returns it with the pose that takes the file's coordinates
 /// there, so that a second file in the same frame can be placed with [`Placement::Frame`].
 #[must_use]
@@ -76,15 +79,15 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
         Placement::Viewpoint => raw.viewpoint.unwrap_or_default(),
         Placement::UpAndHeight { up, sensor_height, support_height } => {
             let upright = upright(up);
-            let mean = mean(&raw.points, &upright);
+            let mean = mean(raw.anchors(), &upright);
             let sensor = upright * raw.sensor.unwrap_or_default();
             let height = sensor_height + support_height - sensor.z;
             Isometry3::from_parts(Translation3::new(-mean.x, -mean.y, height), upright)
         }
         Placement::Up { up, support_height } => {
             let upright = upright(up);
-            let mean = mean(&raw.points, &upright);
-            let (lowest, _) = stray::support(&raw.points, &upright);
+            let mean = mean(raw.anchors(), &upright);
+            let lowest = lowest(raw, &upright);
             let shift = Translation3::new(-mean.x, -mean.y, support_height - lowest);
             Isometry3::from_parts(shift, upright)
         }
@@ -185,6 +188,14 @@ fn upright(up: &UnitVector3<f64>) -> UnitQuaternion<f64> {
     let y = up.cross(&x);
     let rows = nalgebra::Matrix3::from_rows(&[x.transpose(), y.transpose(), up.transpose()]);
     UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(rows))
+}
+
+/// The lowest that a scan rests on, over the rotated frame's origin: the lowest point that has others
+/// around it; of a mesh, whose points leave out the corners, the lowest corner about there. \[m\]
+fn lowest(raw: &RawScan, upright: &UnitQuaternion<f64>) -> f64 {
+    let (carried, _) = stray::support(&raw.points, upright);
+    let corners = raw.vertices.iter().map(|p| (upright * p).z);
+    corners.filter(|z| *z >= carried - FOOT).fold(carried, f64::min)
 }
 
 /// The mean of the rotated points.

@@ -9,6 +9,8 @@ use super::warning::ScanWarning;
 pub struct RawScan {
     /// The finite points. \[m\]
     pub points: Vec<Point3<f64>>,
+    /// The finite corners of a mesh, on which `points` were laid; empty for points. \[m\]
+    pub vertices: Vec<Point3<f64>>,
     /// Unit normals parallel to `points`, where the file has a usable one for every point.
     pub normals: Option<Vec<UnitVector3<f64>>>,
     /// Places inside what closed meshes enclose, on a grid. \[m\]
@@ -34,6 +36,7 @@ impl Default for RawScan {
     fn default() -> Self {
         Self {
             points: Vec::new(),
+            vertices: Vec::new(),
             normals: None,
             inside: Vec::new(),
             viewpoint: None,
@@ -41,5 +44,14 @@ impl Default for RawScan {
             dropped: 0,
             warnings: Vec::new(),
         }
+    }
+}
+
+impl RawScan {
+    /// What it is placed by: a mesh by its corners, so that it stands where it stands whatever points
+    /// a seed lays on it.
+    #[must_use]
+    pub fn anchors(&self) -> &[Point3<f64>] {
+        if self.vertices.is_empty() { &self.points } else { &self.vertices }
     }
 }

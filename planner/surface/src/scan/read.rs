@@ -159,14 +159,20 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     if let Some(at) = &mut sensor {
         at.coords *= scale;
     }
-    let (mut dropped, mut inside) = (0, Vec::new());
+    let (mut dropped, mut inside, mut vertices) = (0, Vec::new(), Vec::new());
     if !triangles.is_empty() {
         sensor = None;
         unused(points.len(), &triangles, &mut warnings);
         let wound = winding::outward(&points, triangles, &mut warnings);
         inside = inside::fill(&points, &wound, &mut warnings);
+        let corners = wound.triangles.iter().flatten();
+        let mut used = vec![false; points.len()];
+        corners.for_each(|&corner| used[corner] = true);
+        vertices = points;
         (points, normals, dropped) =
-            sample::sample(&points, &wound, options.mesh_spacing, options.seed, &mut warnings);
+            sample::sample(&vertices, &wound, options.mesh_spacing, options.seed, &mut warnings);
+        let mut used = used.into_iter();
+        vertices.retain(|p| used.next() == Some(true) && p.iter().all(|c| c.is_finite()));
     }
     let finite: Vec<bool> = points.iter().map(|p| p.coords.iter().all(|c| c.is_finite())).collect();
     dropped += keep(&mut points, &mut normals, &finite);
@@ -209,7 +215,7 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     let normals = (normals.len() == points.len())
         .then(|| normals.into_iter().map(unit).collect::<Option<Vec<_>>>())
         .flatten();
-    Ok(RawScan { points, normals, inside, viewpoint, sensor, dropped, warnings })
+    Ok(RawScan { points, vertices, normals, inside, viewpoint, sensor, dropped, warnings })
 }
 
 /// Tells of a mesh's vertices that are in none of its faces, as points and lines beside them are.
