@@ -88,3 +88,26 @@ choices! {
         BobbyCar,
     }
 }
+
+/// Whether the pad's way on the surface is made fair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SmoothArg {
+    /// Where corners cost time: not at bang-bang velocity.
+    Auto,
+    /// A fair curve.
+    On,
+    /// From patch to patch, in lines.
+    Off,
+}
+
+impl SmoothArg {
+    /// Whether a plan of some profile is to be made fair.
+    #[must_use]
+    pub fn with(self, profile: Profile) -> bool {
+        match self {
+            Self::Auto => profile != Profile::Velocity,
+            Self::On => true,
+            Self::Off => false,
+        }
+    }
+}

@@ -20,7 +20,7 @@ use nullsweep_robot::{Robot, Tool};
 use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
-use crate::choices::{CostArg, MethodArg, ProfileArg};
+use crate::choices::{CostArg, MethodArg, ProfileArg, SmoothArg};
 use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::{Held, Place, finite, not_negative, percent, positive, velocity};
@@ -93,6 +93,10 @@ pub(super) struct PlanArgs {
     /// acceleration allow, corners blended within the line's tolerance.
     #[arg(long, value_enum, default_value = "velocity")]
     profile: ProfileArg,
+    /// Whether the pad's way on the surface is made a fair curve, as far as it sweeps as much: `on`,
+    /// `off`, or `auto`: with limited accelerations or jerks.
+    #[arg(long, value_enum, default_value = "auto")]
+    smooth: SmoothArg,
     /// Radius of a patch's neighbourhood. [m]
     #[arg(long, default_value_t = PatchConfig::default().epsilon, value_parser = positive)]
     patch_radius: f64,
@@ -422,6 +426,7 @@ fn job(
         ik_samples: args.ik_samples as usize,
         v_max: args.v_max,
         profile: args.profile.into(),
+        smooth: args.smooth.with(args.profile.into()),
         patches: PatchConfig { epsilon: args.patch_radius, ..PatchConfig::default() },
         graph: GraphConfig {
             neighbours: args.neighbours,

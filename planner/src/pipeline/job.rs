@@ -36,6 +36,8 @@ pub struct Job {
     pub v_max: Option<f64>,
     /// How fast the plan goes along its path.
     pub profile: Profile,
+    /// Whether the pad's way on the surface is made fair, see [`crate::fairing`].
+    pub smooth: bool,
     /// Patch extraction.
     pub patches: PatchConfig,
     /// Graph construction.
@@ -67,6 +69,7 @@ impl Job {
             ik_samples: 100,
             v_max: None,
             profile: Profile::Velocity,
+            smooth: false,
             patches: PatchConfig::default(),
             graph: GraphConfig::default(),
             formulation: FormulationConfig::default(),

@@ -15,10 +15,12 @@ use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
 use super::swept::{leave_out_swept, points_of, swept_before};
 use crate::cost;
+use crate::fairing::{Keep, fair};
 use crate::plan::{Plan, Profile};
 use crate::progress::Progress;
 use crate::roadmap::Graph;
-use crate::timing::{Limits, Rest, accelerate};
+use crate::sweep::passes;
+use crate::timing::{self, Limits, Rest, accelerate};
 use crate::verify::{Given, verify};
 use crate::workcell::{Bed, Sample, Scene, Workcell, reach};
 
@@ -107,6 +109,12 @@ pub fn run(
     let best = search(&planning, patches, samples, &mut clock)?;
     let Attempt { patches, graph, sequence, mut plan, .. } = best;
     planning.leave(&mut plan);
+    if job.smooth {
+        progress.stage("fairing", None);
+        let keep = Keep { scan, points: planning.to_sweep };
+        plan = clock.time("fairing", || fair(&plan, cell, &bed, keep));
+        timing::set_times(&mut plan.knots, &planning.velocity);
+    }
     if job.profile == Profile::Acceleration {
         progress.stage("timing", None);
         plan = clock.time("timing", || accelerate(&plan, cell, &Limits::of(&arm, job.v_max), &[]));
@@ -136,6 +144,7 @@ pub fn run(
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
+        passes: passes(scan, plan.trajectory(), &arm),
         verification,
         seed: job.seed,
         ..figures(&plan, &arm, &graph, &sequence)

@@ -99,7 +99,7 @@ const BELOW_3: &[&str] = &["progress", "cost", "workcell", "plan", "roadmap", "s
 #[rustfmt::skip]
 const BELOW_4: &[&str] = &[
     "progress", "cost", "workcell", "plan", "roadmap", "sweep",
-    "tour", "motion", "timing", "verify", "link",
+    "tour", "motion", "fairing", "timing", "verify", "link",
 ];
 
 const PLANNER: &[(&str, &[&str])] = &[
@@ -115,6 +115,7 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("sweep", &["progress", "cost", "workcell", "plan", "roadmap"]),
     ("tour", BELOW_3),
     ("motion", BELOW_3),
+    ("fairing", BELOW_3),
     ("timing", BELOW_3),
     ("verify", &["progress", "cost", "workcell", "plan", "sweep"]),
     ("link", BELOW_3),
