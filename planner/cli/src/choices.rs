@@ -91,7 +91,7 @@ choices! {
 
 /// Whether the pad's way on the surface is made fair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SmoothArg {
+pub(crate) enum SmoothArg {
     /// Where corners cost time: not at bang-bang velocity.
     Auto,
     /// A fair curve.
@@ -103,7 +103,7 @@ pub enum SmoothArg {
 impl SmoothArg {
     /// Whether a plan of some profile is to be made fair.
     #[must_use]
-    pub fn with(self, profile: Profile) -> bool {
+    pub(crate) fn with(self, profile: Profile) -> bool {
         match self {
             Self::Auto => profile != Profile::Velocity,
             Self::On => true,

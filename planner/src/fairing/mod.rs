@@ -44,7 +44,8 @@ pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan 
     let mut pieces: Vec<Fair> =
         Piece::all(plan, cell, bed).into_iter().map(|piece| Fair::new(piece)).collect();
     let swept = |plan: &Plan| {
-        let swept = coverage::swept(keep.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool);
+        let swept =
+            coverage::swept(keep.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool);
         let counts = swept.iter().zip(keep.points).map(|(swept, counts)| *swept && *counts);
         counts.collect::<Vec<bool>>()
     };

@@ -112,12 +112,7 @@ impl Piece {
         pieces
     }
 
-    fn new(
-        plan: &Plan,
-        [first, last]: [usize; 2],
-        cell: Workcell<'_>,
-        bed: &Bed,
-    ) -> Option<Self> {
+    fn new(plan: &Plan, [first, last]: [usize; 2], cell: Workcell<'_>, bed: &Bed) -> Option<Self> {
         let pad = cell.tool.on(cell.arm);
         let knots = &plan.knots[first..=last];
         let own = |q: &JointVector| {
@@ -167,12 +162,8 @@ impl Piece {
     /// Where along it the pad's centre comes nearest to a point, if nearer than `reach`. \[m\]
     pub(super) fn nearest(&self, point: &Point3<f64>, reach: f64) -> Option<f64> {
         let squared = |s: &State| (s.centre - point.coords).norm_squared();
-        let (k, distance) = self
-            .states
-            .iter()
-            .map(squared)
-            .enumerate()
-            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (k, distance) =
+            self.states.iter().map(squared).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let last = (self.states.len() - 1).max(1);
         (distance <= reach * reach).then_some(self.length * k as f64 / last as f64)
     }

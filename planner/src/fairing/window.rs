@@ -3,8 +3,8 @@
 /// Spacing of the places at which widths are kept. \[m\]
 const GRID: f64 = 0.002;
 /// The widest windows, of the pad's place and of its heading and the joints. \[m\]
-const PLACE: f64 = 0.12;
-const POSTURE: f64 = 0.20;
+const PLACE: f64 = 0.2;
+const POSTURE: f64 = 0.4;
 /// Steepest change of a window's share along the way. \[1/m\]
 const STEEPEST: f64 = 8.0;
 /// Half of the length over which changes of the share are rounded. \[m\]
