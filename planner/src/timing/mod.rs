@@ -2,6 +2,7 @@
 
 mod accelerate;
 mod bang_bang;
+mod jerk;
 mod optimal;
 mod sampled;
 mod smooth;
