@@ -15,19 +15,22 @@ mod spline;
 use nullsweep_robot::JointVector;
 
 use self::pacing::{Node, pace};
-use self::spline::Spline;
+use self::spline::{Excess, Spline};
 use super::Limits;
 use super::sampled::Timed;
 use crate::plan::Curve;
 
-/// Time between two nodes of the reference, and least time between two knots. \[ns\]
+/// Time between two nodes of the reference, and at first between two knots; less where the run is
+/// so short that there would be fewer than [`FINE`], but no less than the least. \[ns\]
 const STEP_NS: u64 = 4_000_000;
+const LEAST_NS: u64 = 1_000_000;
+const FINE: u64 = 400;
 /// Most knots that a run is given.
 const MOST_KNOTS: u64 = 8000;
 /// The reference is averaged over so many nodes, one average after the other.
 const AVERAGED: [usize; 2] = [7, 3];
 /// Rounds of giving less of the limits where the spline breaks them.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 6;
 /// By how much it may break them until it is slowed down as a whole instead.
 const SLACK: f64 = 0.004;
 /// Share of the limits that is planned with, so that whole nanoseconds break none.
@@ -49,7 +52,7 @@ pub(super) fn limited(
     if span_ns == 0 {
         return run.to_vec();
     }
-    let step_ns = STEP_NS.max(span_ns / MOST_KNOTS).min(span_ns / 8 + 1);
+    let step_ns = (span_ns / FINE).clamp(LEAST_NS, STEP_NS).max(span_ns / MOST_KNOTS);
     let step = step_ns as f64 * 1e-9;
     let reference = reference(run, step_ns);
     let mut nodes: Vec<Node> = reference
@@ -67,7 +70,8 @@ pub(super) fn limited(
         let squared = pace(&nodes, step, limits, jerk);
         let made = Spline::along(inner, &squared, step, step_ns);
         let excess = made.excess(limits, jerk);
-        let worst = excess.iter().map(|e| e.1).fold(1.0, f64::max);
+        let worst = excess.iter().map(|e| e.factor).fold(1.0, f64::max);
+        let mut asked = vec![1.0f64; nodes.len()];
         let slowed = made.slowed(worst);
         if best.as_ref().is_none_or(|best| slowed.seconds() < best.seconds()) {
             best = Some(slowed);
@@ -75,14 +79,15 @@ pub(super) fn limited(
         if worst <= 1.0 + SLACK {
             break;
         }
-        for (place, factor) in excess {
-            let at = place as usize;
-            let around = at.saturating_sub(2)..(at + 4).min(nodes.len());
-            for node in &mut nodes[around] {
-                // Less than a factor on speed alone: its neighbours are given less as well.
-                node.share = node.share.min(HEADROOM / factor.powi(2));
+        for Excess { from, to, factor } in excess {
+            let around = (from as usize).saturating_sub(1)..(to as usize + 3).min(nodes.len());
+            // Of the limits a jerk asks for the third power of what speed is given; a place is
+            // given less once a round, by the most that any stretch around it asks for.
+            for less in &mut asked[around] {
+                *less = less.max(factor.powi(3));
             }
         }
+        nodes.iter_mut().zip(&asked).for_each(|(node, less)| node.share /= less);
     }
     best.map_or_else(|| run.to_vec(), |spline| spline.knots(first.time_ns, inner))
 }

@@ -96,7 +96,11 @@ impl Problem {
         let cap = |node: &Node| {
             let share = |j: usize| {
                 let speed = node.rate[0][j].abs();
-                if speed > 0.0 { (limits.velocity[j] * node.share / speed).powi(2) } else { f64::INFINITY }
+                if speed > 0.0 {
+                    (limits.velocity[j] * node.share / speed).powi(2)
+                } else {
+                    f64::INFINITY
+                }
             };
             (0..joints).map(share).fold(node.cap.min(FASTEST * FASTEST), f64::min)
         };

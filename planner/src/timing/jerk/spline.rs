@@ -33,12 +33,22 @@ fn at<V, T>(values: &[V], place: f64, zero: T, add: impl Fn(T, &V, f64) -> T) ->
     sum
 }
 
+/// A stretch that exceeds the limits.
+pub(super) struct Excess {
+    /// Where on the reference, in nodes.
+    pub(super) from: f64,
+    pub(super) to: f64,
+    /// By what factor on speed.
+    pub(super) factor: f64,
+}
+
 impl Spline {
     /// Through a reference whose nodes are `step` \[s\] apart, by the squared pace at each.
     pub(super) fn along(reference: &[Place], squared: &[f64], step: f64, step_ns: u64) -> Self {
         let last = (reference.len() - 1) as f64;
         let pace = |place: f64| {
-            at(squared, place.clamp(0.0, last), 0.0, |sum, b, weight| sum + weight * b).sqrt() / step
+            at(squared, place.clamp(0.0, last), 0.0, |sum, b, weight| sum + weight * b).sqrt()
+                / step
         };
         let h = step_ns as f64 * 1e-9;
         let position = |place: f64| {
@@ -81,8 +91,8 @@ impl Spline {
         self.step_ns as f64 * 1e-9
     }
 
-    /// Where on the reference, in nodes, the limits are exceeded, and by what factor on speed.
-    pub(super) fn excess(&self, limits: &Limits, jerk: &JointVector) -> Vec<(f64, f64)> {
+    /// Where the limits are exceeded.
+    pub(super) fn excess(&self, limits: &Limits, jerk: &JointVector) -> Vec<Excess> {
         let h = self.step();
         let mut found = Vec::new();
         for (w, places) in self.points.windows(4).zip(self.places.windows(4)) {
@@ -93,7 +103,8 @@ impl Spline {
                 }
                 let differences: [f64; 3] = std::array::from_fn(|k| (w[k + 1][j] - w[k][j]) / h);
                 let velocity = differences.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-                let accelerations = [0, 1].map(|k: usize| (differences[k + 1] - differences[k]) / h);
+                let accelerations =
+                    [0, 1].map(|k: usize| (differences[k + 1] - differences[k]) / h);
                 let acceleration = accelerations[0].abs().max(accelerations[1].abs());
                 let third = (accelerations[1] - accelerations[0]).abs() / h;
                 most = most.max(velocity / limits.velocity[j]);
@@ -101,7 +112,7 @@ impl Spline {
                 most = most.max((third / jerk[j]).cbrt());
             }
             if most > 1.0 {
-                found.push((places[1], most));
+                found.push(Excess { from: places[0], to: places[3], factor: most });
             }
         }
         found
