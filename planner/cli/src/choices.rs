@@ -52,6 +52,8 @@ choices! {
         Velocity,
         /// As fast as velocity and acceleration allow, corners blended.
         Acceleration,
+        /// As fast as velocity, acceleration and jerk allow, corners blended.
+        Jerk,
     }
 }
 

@@ -46,18 +46,21 @@ pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan 
     let swept = |plan: &Plan| {
         let swept =
             coverage::swept(keep.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool);
-        let counts = swept.iter().zip(keep.points).map(|(swept, counts)| *swept && *counts);
-        counts.collect::<Vec<bool>>()
+        swept
     };
-    let count = |swept: &[bool]| swept.iter().filter(|s| **s).count();
+    // Of the points to sweep, and of all.
+    let count = |swept: &[bool]| {
+        let counts = swept.iter().zip(keep.points).filter(|(swept, counts)| **swept && **counts);
+        [counts.count(), swept.iter().filter(|s| **s).count()].map(|count| count as f64)
+    };
     let before = swept(plan);
-    let all = keep.points.iter().filter(|p| **p).count();
-    let least = count(&before) as f64 - LOSS * all as f64;
+    let whole = count(&vec![true; keep.points.len()]);
+    let least: [f64; 2] = std::array::from_fn(|i| count(&before)[i] - LOSS * whole[i]);
     loop {
         pieces.par_iter_mut().for_each(|piece| piece.make(cell, bed));
         let made = assembled(plan, &pieces);
         let after = swept(&made);
-        if count(&after) as f64 >= least {
+        if count(&after).iter().zip(least).all(|(count, least)| *count >= least) {
             return made;
         }
         let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);

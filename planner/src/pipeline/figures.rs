@@ -10,7 +10,7 @@ use super::left_out::LeftOut;
 use crate::cost::{self, Effort};
 use crate::plan::Plan;
 use crate::roadmap::Graph;
-use crate::sweep::{DIP, Pace, Passes};
+use crate::sweep::{DIP, Held, Pace, Passes};
 use crate::verify::Verification;
 
 /// Every figure of a run.
@@ -61,6 +61,9 @@ pub struct Figures {
     /// How often it passes over what it sweeps.
     #[serde(flatten)]
     pub passes: Passes,
+    /// How well the tool speed that was asked for is held.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub tool_speed: Option<Held>,
     /// What the finished plan's check found.
     #[serde(flatten)]
     pub verification: Verification,

@@ -32,7 +32,9 @@ impl Trajectory<'_> {
         let seconds = b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9;
         match self.profile {
             Profile::Velocity => Curve::line(&a.q, &b.q, seconds),
-            Profile::Acceleration => Curve::cubic((&a.q, &a.v), (&b.q, &b.v), seconds),
+            Profile::Acceleration | Profile::Jerk => {
+                Curve::cubic((&a.q, &a.v), (&b.q, &b.v), seconds)
+            }
         }
     }
 

@@ -2,12 +2,14 @@
 //! over.
 
 pub mod coverage;
+mod held;
 mod pace;
 mod pads;
 mod passes;
 mod percentile;
 mod segment;
 
+pub use held::{Held, Slower};
 pub use pace::{DIP, JointPace, Pace};
 pub use pads::{Pad, contact_motion, pad_motion};
 pub use passes::{Passes, passes};

@@ -17,7 +17,7 @@ use nullsweep_robot::JointVector;
 use self::pacing::{Node, pace};
 use self::spline::{Excess, Spline};
 use super::Limits;
-use super::sampled::Timed;
+use super::sampled::{SpeedCap, Timed};
 use crate::plan::Curve;
 
 /// Time between two nodes of the reference, and at first between two knots; less where the run is
@@ -45,7 +45,7 @@ pub(super) fn limited(
     run: &[Timed],
     limits: &Limits,
     jerk: &JointVector,
-    tool: &dyn Fn(f64, &JointVector, &JointVector) -> f64,
+    tool: &SpeedCap<'_>,
 ) -> Vec<Timed> {
     let (Some(first), Some(last)) = (run.first(), run.last()) else { return Vec::new() };
     let span_ns = last.time_ns.saturating_sub(first.time_ns);
