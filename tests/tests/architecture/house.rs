@@ -138,7 +138,12 @@ const SURFACE: &[&str] =
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[
     // What is wrong in the search must not be wrong in the verification too.
-    ("planner/src", "verify", &["roadmap", "tour", "motion", "pipeline", "task", "transit"]),
+    (
+        "planner/src",
+        "verify",
+        &["roadmap", "tour", "motion", "fairing", "pipeline", "task", "transit"],
+    ),
+    ("planner/src", "fairing", &["verify"]),
     ("planner/src", "roadmap", &["verify"]),
     ("planner/src", "tour", &["verify"]),
     ("planner/src", "motion", &["verify"]),
