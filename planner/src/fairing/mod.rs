@@ -41,12 +41,9 @@ pub struct Keep<'a> {
 /// collision; its times are to be set anew. Where a piece cannot be made fair it is as it was.
 #[must_use]
 pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan {
-    let mut pieces: Vec<Fair> =
-        Piece::all(plan, cell, bed).into_iter().map(|piece| Fair::new(piece)).collect();
+    let mut pieces: Vec<Fair> = Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect();
     let swept = |plan: &Plan| {
-        let swept =
-            coverage::swept(keep.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool);
-        swept
+        coverage::swept(keep.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool)
     };
     // Of the points to sweep, and of all.
     let count = |swept: &[bool]| {

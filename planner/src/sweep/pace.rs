@@ -59,7 +59,8 @@ impl Pace {
         let pad = path.tool.on(arm);
         let mut speeds = Vec::new();
         let mut dips = Dips { speed: dip_speed, ..Dips::default() };
-        let mut joints: Vec<JointPace> = arm.joint_names().iter().map(JointPace::named).collect();
+        let mut joints: Vec<JointPace> =
+            arm.joint_names().iter().map(|name| JointPace::named(name)).collect();
         let mut cursor = TrajectoryCursor::new(path);
         let end_ns = path.knots.last().map_or(0, |k| k.time_ns);
         let mut before: Option<(JointVector, Option<Point3<f64>>)> = None;
@@ -107,8 +108,8 @@ impl Pace {
 }
 
 impl JointPace {
-    fn named(name: &String) -> Self {
-        Self { name: name.clone(), ..Self::default() }
+    fn named(name: &str) -> Self {
+        Self { name: name.to_owned(), ..Self::default() }
     }
 }
 

@@ -214,7 +214,7 @@ impl Problem {
         let slope = fall.clone();
         hessian.solve(&mut fall);
         let decrease: f64 = fall.iter().zip(&slope).map(|(a, b)| a * b).sum();
-        if !(decrease > SMALL * mu) {
+        if decrease.is_nan() || decrease <= SMALL * mu {
             return false;
         }
         let now = self.value(b, mu);
