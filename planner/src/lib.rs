@@ -32,6 +32,7 @@ pub mod plan;
 pub mod roadmap;
 pub mod sweep;
 
+pub mod fairing;
 pub mod motion;
 pub mod timing;
 pub mod tour;

@@ -23,6 +23,7 @@ fn plan(profile: Profile) -> Plan {
         method: Method::Tsp,
         cost: CostKind::Time,
         profile,
+        jerk: None,
         seed: 1,
         knots: vec![knot(0, 0.25, 0.0), knot(1_000_000_005, 0.5, 0.125)],
         patches: Vec::new(),

@@ -67,6 +67,7 @@ mod tests {
             method: Method::Tsp,
             cost: CostKind::Time,
             profile: Profile::Velocity,
+            jerk: None,
             seed: 1,
             knots: Vec::new(),
             patches: Vec::new(),

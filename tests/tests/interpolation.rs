@@ -42,6 +42,7 @@ fn plan(profile: Profile, knots: &[((JointVector, JointVector), u64)]) -> Plan {
         method: Method::Tsp,
         cost: CostKind::Time,
         profile,
+        jerk: None,
         seed: 1,
         knots: knots.collect(),
         patches: Vec::new(),

@@ -52,6 +52,8 @@ choices! {
         Velocity,
         /// As fast as velocity and acceleration allow, corners blended.
         Acceleration,
+        /// As fast as velocity, acceleration and jerk allow, corners blended.
+        Jerk,
     }
 }
 
@@ -86,5 +88,28 @@ choices! {
         Chair,
         /// Table II.
         BobbyCar,
+    }
+}
+
+/// Whether the pad's way on the surface is made fair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SmoothArg {
+    /// Where corners cost time: not at bang-bang velocity.
+    Auto,
+    /// A fair curve.
+    On,
+    /// From patch to patch, in lines.
+    Off,
+}
+
+impl SmoothArg {
+    /// Whether a plan of some profile is to be made fair.
+    #[must_use]
+    pub(crate) fn with(self, profile: Profile) -> bool {
+        match self {
+            Self::Auto => profile != Profile::Velocity,
+            Self::On => true,
+            Self::Off => false,
+        }
     }
 }

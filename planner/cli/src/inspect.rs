@@ -5,19 +5,28 @@ use std::path::PathBuf;
 use clap::Args;
 use nullsweep_planner::cost::{Effort, of_path};
 use nullsweep_planner::plan::Plan;
+use nullsweep_planner::sweep::{DIP, Pace, Passes, passes};
 use nullsweep_planner::workcell::stance::told;
 use nullsweep_robot::MAX_DOF;
 use serde::Serialize;
 
 use crate::exit::OK;
 use crate::json::write_json;
+use crate::numbers::positive;
 use crate::output::say_on;
+use crate::plan::pace_rows;
+use crate::robot::RobotArgs;
 use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
 pub(super) struct InspectArgs {
     /// The plan file.
     plan: PathBuf,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// What counts as a dip of the tool's speed on the surface. [m/s]
+    #[arg(long, value_name = "M/S", default_value_t = DIP, value_parser = positive)]
+    dip: f64,
     /// Write the figures as JSON to a file, or `-`, instead of a table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -40,6 +49,10 @@ struct Summary {
     patches_visited: usize,
     duration_s: f64,
     effort_rad: f64,
+    /// How fast it goes; nothing where the plan is of another arm than the one given.
+    pace: Option<Pace>,
+    #[serde(flatten)]
+    passes: Option<Passes>,
     continues_at_knot: Option<u32>,
     joints: Vec<JointSummary>,
     held: Vec<(String, f64)>,
@@ -55,12 +68,27 @@ struct JointSummary {
 
 pub(super) fn run(args: &InspectArgs) -> anyhow::Result<u8> {
     let plan = Plan::read(&args.plan)?;
-    let summary = summarise(&plan);
+    let (pace, passes) = paced(args, &plan)?.unzip();
+    let summary = Summary { pace, passes, ..summarise(&plan) };
     match &args.json {
         Some(path) => write_json(&summary, path)?,
         None => say_on!("{}", tables(&summary)),
     }
     Ok(OK)
+}
+
+/// How fast the plan goes and how often it passes over a point, by the kinematics of the arm given;
+/// nothing where that is another one.
+fn paced(args: &InspectArgs, plan: &Plan) -> anyhow::Result<Option<(Pace, Passes)>> {
+    let arm = args.robot.arm()?;
+    let is_own = plan.fingerprint == arm.fingerprint() && plan.joints == arm.joint_names();
+    if !is_own || plan.knots.len() < 2 || plan.check_bounds().is_err() {
+        return Ok(None);
+    }
+    let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
+    let arm = arm.with_held(&held)?;
+    let pace = Pace::of(plan.trajectory(), &arm, args.dip);
+    Ok(Some((pace, passes(&plan.scan(), plan.trajectory(), &arm))))
 }
 
 fn summarise(plan: &Plan) -> Summary {
@@ -88,6 +116,8 @@ fn summarise(plan: &Plan) -> Summary {
         patches_visited: plan.knots.iter().filter(|k| k.patch.is_some()).count(),
         duration_s: plan.duration(),
         effort_rad: of_path(&Effort, &path),
+        pace: None,
+        passes: None,
         continues_at_knot: plan.continues.as_ref().map(|c| c.knot),
         joints: joints.collect(),
         held: plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
@@ -104,6 +134,13 @@ fn tables(s: &Summary) -> String {
     plan.add_row(["patches visited", &s.patches_visited.to_string()]);
     plan.add_row(["duration", &format!("{:.2} s", s.duration_s)]);
     plan.add_row(["effort", &format!("{:.2} rad", s.effort_rad)]);
+    for [name, value] in s.pace.as_ref().map(pace_rows).unwrap_or_default() {
+        plan.add_row([name, value]);
+    }
+    if let Some(passes) = &s.passes {
+        let value = format!("{:.0}, {:.0}", passes.passes_p50, passes.passes_p95);
+        plan.add_row(["passes over a point, p50, p95", &value]);
+    }
     if let Some(knot) = s.continues_at_knot {
         plan.add_row(["continues another plan at knot", &knot.to_string()]);
     }

@@ -11,6 +11,7 @@ mod floor;
 mod goto;
 mod gtsp;
 mod inspect;
+mod jerk;
 mod json;
 mod numbers;
 mod output;

@@ -11,6 +11,7 @@ use nullsweep_planner::pipeline::{self, After, End, Figures, Job, Outcome, Stanc
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
+use nullsweep_planner::sweep::{self, JointPace, Pace};
 use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::verify::{Against, Verification};
 use nullsweep_planner::workcell::Scene;
@@ -20,8 +21,9 @@ use nullsweep_robot::{Robot, Tool};
 use nullsweep_surface::PatchConfig;
 
 use crate::bars::Bars;
-use crate::choices::{CostArg, MethodArg, ProfileArg};
+use crate::choices::{CostArg, MethodArg, ProfileArg, SmoothArg};
 use crate::exit::OK;
+use crate::jerk::JerkArg;
 use crate::json::write_json;
 use crate::numbers::{Held, Place, finite, not_negative, percent, positive, velocity};
 use crate::output::{say, writable};
@@ -93,6 +95,19 @@ pub(super) struct PlanArgs {
     /// acceleration allow, corners blended within the line's tolerance.
     #[arg(long, value_enum, default_value = "velocity")]
     profile: ProfileArg,
+    /// Jerk limits for --profile jerk, in place of the URDF's: `franka` (libfranka's), `pr2` or `ur`
+    /// (none are published: full acceleration in 0.1 s), or a TOML file with a table `jerk` of joint
+    /// names. [rad/s³]
+    #[arg(long, value_name = "NAME|FILE")]
+    jerk: Option<JerkArg>,
+    /// Speed of the pad's centre on the surface, wherever the joints allow it; not at bang-bang
+    /// velocity. [m/s]
+    #[arg(long, value_name = "M/S", value_parser = positive)]
+    tool_speed: Option<f64>,
+    /// Whether the pad's way on the surface is made a fair curve, as far as it sweeps as much: `on`,
+    /// `off`, or `auto`: with limited accelerations or jerks.
+    #[arg(long, value_enum, default_value = "auto")]
+    smooth: SmoothArg,
     /// Radius of a patch's neighbourhood. [m]
     #[arg(long, default_value_t = PatchConfig::default().epsilon, value_parser = positive)]
     patch_radius: f64,
@@ -356,6 +371,13 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     row("task time", format!("{:.2} s", f.task_time_s));
     row("distance on the surface", format!("{:.2} m", f.distance_m));
     row("distance in transfers", format!("{:.2} m", f.transfer_m));
+    rows.extend(pace_rows(&f.pace));
+    if let Some(held) = &f.tool_speed {
+        rows.extend(held_rows(held));
+    }
+    let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
+    let passes = format!("{:.0}, {:.0}", f.passes.passes_p50, f.passes.passes_p95);
+    row("passes over a point, p50, p95", passes);
     row("jumps", f.jumps.to_string());
     row("dropped patches", f.dropped_patches.to_string());
     row("knots", f.knots.to_string());
@@ -369,6 +391,45 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     for (stage, seconds) in &f.calc_time_s {
         row(&format!("  {stage}"), format!("{seconds:.2} s"));
     }
+    rows
+}
+
+/// How fast a plan goes along its path, for people.
+pub(super) fn pace_rows(p: &Pace) -> Vec<[String; 2]> {
+    let (p5, p50, p95) = (p.tool_speed_p5, p.tool_speed_p50, p.tool_speed_p95);
+    let largest = |of: fn(&JointPace) -> f64| p.joints.iter().map(of).fold(0.0, f64::max);
+    let shares: Vec<String> =
+        p.joints.iter().map(|j| format!("{:.0}", 100.0 * j.effort_share)).collect();
+    [
+        ("time on the surface", format!("{:.2} s", p.contact_s)),
+        ("tool speed, p5, p50, p95", format!("{p5:.3}, {p50:.3}, {p95:.3} m/s")),
+        ("dips below", format!("{:.2} m/s: {}", p.dip_speed, p.dips)),
+        ("acceleration, max", format!("{:.1} rad/s²", largest(|j| j.acceleration))),
+        ("jerk, max", format!("{:.0} rad/s³", largest(|j| j.jerk))),
+        ("effort by joint, base to tip", format!("{} %", shares.join(", "))),
+    ]
+    .map(|(name, value)| [name.to_owned(), value])
+    .into()
+}
+
+/// How well a tool speed is held, for people.
+fn held_rows(held: &sweep::Held) -> Vec<[String; 2]> {
+    let mut rows = vec![[
+        format!("tool speed of {} m/s held", held.speed),
+        format!("{} of the length", percent(held.share)),
+    ]];
+    rows.extend(held.slower.iter().map(|s| {
+        let [x, y, z] = s.at;
+        let place = format!("{x:.3}, {y:.3}, {z:.3}");
+        let what = format!(
+            "at {:.2} s, {place} m: down to {:.3} m/s over {:.0} mm, by {}",
+            s.time_s,
+            s.speed,
+            1e3 * s.length_m,
+            s.joint
+        );
+        ["  slower".to_owned(), what]
+    }));
     rows
 }
 
@@ -436,6 +497,9 @@ fn job(
         ik_samples: args.ik_samples as usize,
         v_max: args.v_max,
         profile: args.profile.into(),
+        jerk: args.jerk.as_ref().map(|jerk| jerk.of(&arm)).transpose()?,
+        tool_speed: args.tool_speed,
+        smooth: args.smooth.with(args.profile.into()),
         patches: PatchConfig { epsilon: args.patch_radius, ..PatchConfig::default() },
         graph: GraphConfig {
             neighbours: args.neighbours,

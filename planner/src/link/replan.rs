@@ -249,6 +249,7 @@ mod tests {
             method: Method::Tsp,
             cost: CostKind::Time,
             profile: Profile::Velocity,
+            jerk: None,
             seed: 1,
             knots: (0..10).map(knot).collect(),
             patches: Vec::new(),

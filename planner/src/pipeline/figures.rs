@@ -10,6 +10,7 @@ use super::left_out::LeftOut;
 use crate::cost::{self, Effort};
 use crate::plan::Plan;
 use crate::roadmap::Graph;
+use crate::sweep::{DIP, Held, Pace, Passes};
 use crate::verify::Verification;
 
 /// Every figure of a run.
@@ -57,6 +58,14 @@ pub struct Figures {
     pub dropped_patches: usize,
     /// What is not swept, by what is in the way.
     pub left_out: Vec<LeftOut>,
+    /// How fast it goes.
+    pub pace: Pace,
+    /// How often it passes over what it sweeps.
+    #[serde(flatten)]
+    pub passes: Passes,
+    /// How well the tool speed that was asked for is held.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub tool_speed: Option<Held>,
     /// What the finished plan's check found.
     #[serde(flatten)]
     pub verification: Verification,
@@ -78,6 +87,7 @@ pub(super) fn figures(plan: &Plan, arm: &Arm, graph: &Graph, sequence: &Sequence
         transfer_m: pad_path(plan, arm, false),
         knots: plan.knots.len(),
         jumps: sequence.jumps(),
+        pace: Pace::of(plan.trajectory(), arm, DIP),
         dropped_patches: sequence.dropped.len(),
         ..Figures::default()
     }

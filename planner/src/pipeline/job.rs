@@ -36,6 +36,14 @@ pub struct Job {
     pub v_max: Option<f64>,
     /// How fast the plan goes along its path.
     pub profile: Profile,
+    /// Jerk limits of a plan of [`Profile::Jerk`]; `None`: [`crate::timing::jerks`]. \[rad/s³\] or
+    /// \[m/s³\]
+    pub jerk: Option<JointVector>,
+    /// The speed of the pad's centre on the surface, where the joints allow it; `None`: as fast as
+    /// they do. Not at bang-bang velocity. \[m/s\]
+    pub tool_speed: Option<f64>,
+    /// Whether the pad's way on the surface is made fair, see [`crate::fairing`].
+    pub smooth: bool,
     /// Patch extraction.
     pub patches: PatchConfig,
     /// Graph construction.
@@ -67,6 +75,9 @@ impl Job {
             ik_samples: 100,
             v_max: None,
             profile: Profile::Velocity,
+            jerk: None,
+            tool_speed: None,
+            smooth: false,
             patches: PatchConfig::default(),
             graph: GraphConfig::default(),
             formulation: FormulationConfig::default(),

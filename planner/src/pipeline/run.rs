@@ -15,11 +15,13 @@ use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
 use super::swept::{leave_out_swept, points_of, swept_before};
 use crate::cost;
+use crate::fairing::{Keep, fair};
 use crate::motion::Memo;
 use crate::plan::{Plan, Profile};
 use crate::progress::Progress;
 use crate::roadmap::Graph;
-use crate::timing::{Limits, Rest, accelerate};
+use crate::sweep::{Held, passes};
+use crate::timing::{self, Limits, Pace, Rest, paced};
 use crate::verify::{Given, verify};
 use crate::workcell::{Bed, Sample, Scene, Workcell, reach};
 
@@ -108,9 +110,17 @@ pub fn run(
     let best = search(&planning, patches, samples, &mut clock)?;
     let Attempt { patches, graph, sequence, mut plan, .. } = best;
     planning.leave(&mut plan);
-    if job.profile == Profile::Acceleration {
+    if job.smooth {
+        progress.stage("fairing", None);
+        let keep = Keep { scan, points: planning.to_sweep };
+        plan = clock.time("fairing", || fair(&plan, cell, &bed, keep));
+        timing::set_times(&mut plan.knots, &planning.velocity);
+    }
+    if job.profile.is_curved() {
         progress.stage("timing", None);
-        plan = clock.time("timing", || accelerate(&plan, cell, &Limits::of(&arm, job.v_max), &[]));
+        let pace = pace(job, &arm, progress);
+        let limits = Limits::of(&arm, job.v_max);
+        plan = clock.time("timing", || paced(&plan, cell, &limits, &pace));
         if let Some(rest) = rest {
             plan = rest.then(plan);
         }
@@ -140,6 +150,8 @@ pub fn run(
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
+        passes: passes(scan, plan.trajectory(), &arm),
+        tool_speed: job.tool_speed.map(|speed| Held::of(plan.trajectory(), &arm, speed)),
         verification,
         seed: job.seed,
         ..figures(&plan, &arm, &graph, &sequence)
@@ -147,6 +159,21 @@ pub fn run(
     reachable.resize(patches.len(), true);
     let scan = here.surface;
     Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
+}
+
+/// What the plan keeps to besides velocity and acceleration.
+fn pace(job: &Job, arm: &Arm, progress: &dyn Progress) -> Pace<'static> {
+    let known = job.jerk.is_some() || arm.limits().iter().all(|joint| joint.jerk.is_some());
+    if job.profile == Profile::Jerk && !known {
+        progress.note(&format!(
+            "the URDF has no jerk limits: each joint is taken to come to its full acceleration in \
+             {} s",
+            timing::DEFAULT_JERK_TIME
+        ));
+    }
+    let limited = job.profile == Profile::Jerk;
+    let jerk = limited.then(|| job.jerk.unwrap_or_else(|| timing::jerks(arm)));
+    Pace { stops: &[], jerk, tool_speed: job.tool_speed }
 }
 
 /// Where the arm begins; for a plan that joins another one in motion, after the way to rest on the

@@ -80,6 +80,12 @@ impl Curve {
         self.acceleration(0.0)[joint].abs().max(self.acceleration(1.0)[joint].abs())
     }
 
+    /// The jerk of a joint, which is constant. \[rad/s³\] or \[m/s³\]
+    #[must_use]
+    pub fn jerk(&self, joint: usize) -> f64 {
+        6.0 * self.terms[3][joint] / self.seconds.powi(3)
+    }
+
     /// The lowest and the highest position of a joint. \[rad\] or \[m\]
     #[must_use]
     pub fn range(&self, joint: usize) -> (f64, f64) {

@@ -6,7 +6,6 @@ use nullsweep_robot::{JointVector, MAX_DOF};
 use serde::Serialize;
 
 use super::file::Plan;
-use super::settings::Profile;
 
 /// How a trajectory is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +68,7 @@ pub struct Point {
 #[must_use]
 pub fn trajectory(plan: &Plan) -> JointTrajectory {
     let lanes = |q: &JointVector| q.iter().copied().take(plan.joints.len()).collect();
-    let curved = plan.profile == Profile::Acceleration;
+    let curved = plan.profile.is_curved();
     let points = plan
         .knots
         .iter()

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use nullsweep_robot::{Arm, MAX_DOF, Robot, Tool};
+use nullsweep_robot::{Arm, JointVector, MAX_DOF, Robot, Tool};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -41,6 +41,9 @@ pub struct Plan {
     /// How fast it goes along its path, and so how the joints move between knots.
     #[serde(default)]
     pub profile: Profile,
+    /// The jerk that it keeps each joint within, if any. \[rad/s³\] or \[m/s³\]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub jerk: Option<JointVector>,
     /// Seed of every random choice.
     pub seed: u64,
     /// The timed path.
@@ -138,6 +141,7 @@ impl Plan {
             method: Method::Tsp,
             cost: CostKind::Effort,
             profile: Profile::Velocity,
+            jerk: None,
             seed: 0,
             knots,
             patches: Vec::new(),

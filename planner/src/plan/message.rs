@@ -45,7 +45,7 @@ impl Plan {
             knot_count: knots.len() as u32,
             interpolation: match self.profile {
                 Profile::Velocity => Interpolation::Linear.wire(),
-                Profile::Acceleration => Interpolation::Cubic.wire(),
+                Profile::Acceleration | Profile::Jerk => Interpolation::Cubic.wire(),
             },
             corners: u32::from(self.profile == Profile::Velocity),
             ..PlanHeader::default()

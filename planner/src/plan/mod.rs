@@ -18,4 +18,4 @@ pub use file::{Continues, Held, Plan, Stretch, SurfaceSample};
 pub use knot::PlanKnot;
 pub use seal::Seal;
 pub use settings::{BLEND_TOLERANCE, CostKind, LIFT, LINE_TOLERANCE, Method, Profile};
-pub use trajectory::Trajectory;
+pub use trajectory::{Trajectory, TrajectoryCursor};

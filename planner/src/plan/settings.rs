@@ -46,4 +46,14 @@ pub enum Profile {
     Velocity,
     /// As fast as velocity and acceleration allow, corners blended.
     Acceleration,
+    /// As fast as velocity, acceleration and jerk allow, corners blended.
+    Jerk,
+}
+
+impl Profile {
+    /// Whether the joints follow cubics between knots, which have velocities; else straight lines.
+    #[must_use]
+    pub fn is_curved(self) -> bool {
+        self != Self::Velocity
+    }
 }

@@ -1,7 +1,7 @@
 //! The timed path through a plan's knots, as the executor interpolates it.
 
 use nalgebra::Point3;
-use nullsweep_robot::Tool;
+use nullsweep_robot::{JointVector, Tool};
 
 use super::curve::Curve;
 use super::knot::PlanKnot;
@@ -32,7 +32,9 @@ impl Trajectory<'_> {
         let seconds = b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9;
         match self.profile {
             Profile::Velocity => Curve::line(&a.q, &b.q, seconds),
-            Profile::Acceleration => Curve::cubic((&a.q, &a.v), (&b.q, &b.v), seconds),
+            Profile::Acceleration | Profile::Jerk => {
+                Curve::cubic((&a.q, &a.v), (&b.q, &b.v), seconds)
+            }
         }
     }
 
@@ -41,5 +43,33 @@ impl Trajectory<'_> {
     pub fn on_surface(&self, knot: usize) -> bool {
         let before = self.line(knot.saturating_sub(1));
         before.is_some() && self.line(knot).is_some()
+    }
+}
+
+/// Goes along a trajectory in time, forwards.
+#[derive(Clone, Copy, Debug)]
+pub struct TrajectoryCursor<'a> {
+    path: Trajectory<'a>,
+    /// The knot in which the segment of the last time ends.
+    knot: usize,
+}
+
+impl<'a> TrajectoryCursor<'a> {
+    /// At its start; it has two knots or more.
+    #[must_use]
+    pub fn new(path: Trajectory<'a>) -> Self {
+        Self { path, knot: 1 }
+    }
+
+    /// The knot in which the segment of a time \[ns\] ends, and where the joints are then; before the
+    /// start and after the end where they are there. Times must not fall from call to call.
+    pub fn at(&mut self, time_ns: u64) -> (usize, JointVector) {
+        let knots = self.path.knots;
+        while self.knot + 1 < knots.len() && knots[self.knot].time_ns < time_ns {
+            self.knot += 1;
+        }
+        let curve = self.path.curve(self.knot);
+        let since = time_ns.saturating_sub(knots[self.knot - 1].time_ns) as f64 * 1e-9;
+        (self.knot, curve.at(since / curve.seconds()))
     }
 }

@@ -15,23 +15,36 @@ use crate::plan::Trajectory;
 #[must_use]
 pub fn swept(scan: &Scan, contact_poses: &[Isometry3<f64>], tool: &Tool) -> Vec<bool> {
     let mut swept = vec![false; scan.points.len()];
+    visit_swept(scan, contact_poses, tool, |_, point| swept[point] = true);
+    swept
+}
+
+/// Calls `visit` with the index of each pose and of each point that the pad sweeps there, pose
+/// after pose.
+pub(super) fn visit_swept(
+    scan: &Scan,
+    contact_poses: &[Isometry3<f64>],
+    tool: &Tool,
+    mut visit: impl FnMut(usize, usize),
+) {
     let half_diagonal = 0.5 * tool.width.hypot(tool.length);
     let reach = half_diagonal.hypot(tool.reach_normal);
     let grid = Grid::new(&scan.points, 0.5 * reach);
     let aligned = tool.reach_angle.cos();
-    for pose in contact_poses {
+    for (at, pose) in contact_poses.iter().enumerate() {
         let [x, y, z] = [0, 1, 2].map(|axis| pose.rotation * nalgebra::Vector3::ith_axis(axis));
         let centre = nalgebra::Point3::from(pose.translation.vector + z.scale(tool.stand_off));
         grid.within(&centre, reach, |index, point, _| {
             let offset = point - centre;
-            let seen = &mut swept[index as usize];
-            *seen |= offset.dot(&x).abs() <= 0.5 * tool.width
+            let touches = offset.dot(&x).abs() <= 0.5 * tool.width
                 && offset.dot(&y).abs() <= 0.5 * tool.length
                 && offset.dot(&z).abs() <= tool.reach_normal
                 && -scan.normals[index as usize].dot(&z) >= aligned;
+            if touches {
+                visit(at, index as usize);
+            }
         });
     }
-    swept
 }
 
 /// Whether a pad that is led over the middle of a patch sweeps a point of the scan there, whatever its

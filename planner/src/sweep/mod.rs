@@ -1,8 +1,17 @@
-//! What the pad sweeps: its motion on the surface and the points that it passes over.
+//! What the pad sweeps: its motion on the surface, how fast it goes, and the points that it passes
+//! over.
 
 pub mod coverage;
+mod held;
+mod pace;
 mod pads;
+mod passes;
+mod percentile;
 mod segment;
 
+pub use held::{Held, Slower};
+pub use pace::{DIP, JointPace, Pace};
 pub use pads::{Pad, contact_motion, pad_motion};
+pub use passes::{Passes, passes};
+pub(crate) use percentile::percentile;
 pub use segment::distance_to_segment;

@@ -3,11 +3,12 @@
 use nalgebra::Point3;
 use nullsweep_collision::ToolContact;
 use nullsweep_robot::JointVector;
+use rayon::prelude::*;
 
-use super::Limits;
-use super::sampled::{Timed, braked, timed};
+use super::sampled::{Timed, braked, timed_within};
 use super::smooth::{cut, smooth};
 use super::smooth_path::{Piece, SmoothPath};
+use super::{Limits, jerk};
 use crate::plan::{BLEND_TOLERANCE, Plan, PlanKnot, Profile};
 use crate::sweep::distance_to_segment;
 use crate::workcell::Workcell;
@@ -20,12 +21,62 @@ const CHORD: f64 = 2e-4;
 /// allow. In the corners at the knots `stops`, and where no blend fits, the arm comes to rest.
 #[must_use]
 pub fn accelerate(plan: &Plan, cell: Workcell<'_>, limits: &Limits, stops: &[usize]) -> Plan {
+    paced(plan, cell, limits, &Pace { stops, ..Pace::default() })
+}
+
+/// What a plan keeps to besides velocity and acceleration.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pace<'a> {
+    /// Knots at whose corners the arm comes to rest.
+    pub stops: &'a [usize],
+    /// The greatest jerk of each joint. \[rad/s³\] or \[m/s³\]
+    pub jerk: Option<JointVector>,
+    /// The greatest speed of the pad's centre on the surface. \[m/s\]
+    pub tool_speed: Option<f64>,
+}
+
+/// As [`accelerate`], within a limit of jerk and a tool speed, where there are any.
+#[must_use]
+pub fn paced(plan: &Plan, cell: Workcell<'_>, limits: &Limits, pace: &Pace<'_>) -> Plan {
     let points: Vec<JointVector> = plan.knots.iter().map(|k| k.q).collect();
     let judge = Judge { plan, cell };
-    let runs = smooth(&points, &|i, halves| !stops.contains(&i) && judge.fits(i, halves));
-    let knots = timed(&runs, limits).iter().map(|t| knot(&plan.knots, t)).collect();
-    Plan { profile: Profile::Acceleration, knots, ..plan.clone() }
+    let runs = smooth(&points, &|i, halves| !pace.stops.contains(&i) && judge.fits(i, halves));
+    let pad = cell.tool.on(cell.arm);
+    let cap = |source: f64, q: &JointVector, v: &JointVector| {
+        let Some(speed) = pace.tool_speed else { return f64::INFINITY };
+        let touches = [source.floor() as usize + 1, (source.ceil() as usize).max(1)];
+        if !touches.into_iter().any(|knot| plan.on_surface(knot)) {
+            return f64::INFINITY;
+        }
+        let moved = JointVector::from_fn(|j| q[j] + MOMENT * v[j]);
+        WITHIN * speed * MOMENT / (pad.centre(&moved) - pad.centre(q)).norm().max(1e-15)
+    };
+    let timed = match pace.jerk {
+        None => timed_within(&runs, limits, &cap),
+        Some(jerk) => {
+            let one = |run: &SmoothPath| {
+                let free = timed_within(std::slice::from_ref(run), limits, &cap);
+                jerk::limited(&free, limits, &jerk, &cap)
+            };
+            let mut all: Vec<Timed> = Vec::new();
+            for run in runs.par_iter().map(one).collect::<Vec<_>>() {
+                let from = all.last().map_or(0, |last| last.time_ns);
+                let again = usize::from(!all.is_empty());
+                let late = |t: Timed| Timed { time_ns: t.time_ns + from, ..t };
+                all.extend(run.into_iter().skip(again).map(late));
+            }
+            all
+        }
+    };
+    let knots = timed.iter().map(|t| knot(&plan.knots, t)).collect();
+    let profile = if pace.jerk.is_some() { Profile::Jerk } else { Profile::Acceleration };
+    Plan { profile, jerk: pace.jerk, knots, ..plan.clone() }
 }
+
+/// A moment over which the pad's speed is looked at. \[s\]
+const MOMENT: f64 = 1e-6;
+/// What is planned of a tool speed, so that it is not exceeded between two looks.
+const WITHIN: f64 = 0.997;
 
 /// The way to rest from a knot of a plan with limited acceleration, along its own path.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,13 +1,15 @@
-//! Joint path to timed knots: bang-bang velocity, or time-optimal under limited acceleration.
+//! Joint path to timed knots: bang-bang velocity, or as fast as limits of acceleration, or of
+//! acceleration and jerk, allow.
 
 mod accelerate;
 mod bang_bang;
+mod jerk;
 mod optimal;
 mod sampled;
 mod smooth;
 mod smooth_path;
 
-pub use accelerate::{Rest, accelerate};
+pub use accelerate::{Pace, Rest, accelerate, paced};
 pub use bang_bang::{bang_bang, segment_ns, set_times};
 pub use sampled::{Timed, timed};
 pub use smooth::smooth;
@@ -37,4 +39,18 @@ impl Limits {
         }
         limits
     }
+}
+
+/// Where a joint's jerk limit is not known, it comes to its full acceleration in this time. \[s\]
+pub const DEFAULT_JERK_TIME: f64 = 0.1;
+
+/// Each joint's jerk limit: the URDF's, else its acceleration by [`DEFAULT_JERK_TIME`]. \[rad/s³\] or
+/// \[m/s³\]
+#[must_use]
+pub fn jerks(arm: &Arm) -> JointVector {
+    let mut jerks = JointVector::ZERO;
+    for (jerk, joint) in jerks.iter_mut().zip(arm.limits()) {
+        *jerk = joint.jerk.unwrap_or(joint.acceleration / DEFAULT_JERK_TIME);
+    }
+    jerks
 }

@@ -21,6 +21,8 @@ pub(super) struct Interval {
     pub(super) bend: JointVector,
     /// Share of the limits that may be used, 0…1.
     pub(super) share: f64,
+    /// The greatest x at its start and its end for another reason.
+    pub(super) caps: [f64; 2],
 }
 
 /// x = ṡ² at each grid point of the fastest motion that starts with `start` and ends at rest;
@@ -60,7 +62,8 @@ const SHORTEST: f64 = 1e-6;
 
 /// The greatest x at `s` of an interval under the velocity limits.
 fn speed_cap(interval: &Interval, limits: &Limits, s: f64) -> f64 {
-    let mut cap = (interval.length / SHORTEST).powi(2);
+    let own = interval.caps[usize::from(s > 0.0)];
+    let mut cap = (interval.length / SHORTEST).powi(2).min(own);
     for j in 0..MAX_DOF {
         let slope = (interval.slope[j] + s * interval.bend[j]).abs();
         if slope > 0.0 && limits.velocity[j] > 0.0 {
@@ -195,6 +198,7 @@ mod tests {
                 slope: lane(&[1.0, bend * step * i as f64]),
                 bend: lane(&[0.0, bend]),
                 share: 1.0,
+                caps: [f64::INFINITY; 2],
             })
             .collect()
     }

@@ -37,11 +37,20 @@ const HEADROOM: f64 = 1.0 - 2e-5;
 /// every velocity and acceleration within the limits.
 #[must_use]
 pub fn timed(runs: &[SmoothPath], limits: &Limits) -> Vec<Timed> {
+    timed_within(runs, limits, &|_, _, _| f64::INFINITY)
+}
+
+/// How fast a place of a path may be gone through besides, from its source, position and velocity: a
+/// factor on that velocity.
+pub(super) type SpeedCap<'a> = dyn Fn(f64, &JointVector, &JointVector) -> f64 + Sync + 'a;
+
+/// The same, no faster than `cap` lets it.
+pub(super) fn timed_within(runs: &[SmoothPath], limits: &Limits, cap: &SpeedCap<'_>) -> Vec<Timed> {
     let mut knots: Vec<Timed> = Vec::new();
     for run in runs {
         let from = knots.last().map_or(0, |k| k.time_ns);
         // Rest is where every path can be left from.
-        let own = run_knots(run, limits, HEADROOM, 0.0, from).unwrap_or_default();
+        let own = run_knots(run, limits, cap, [HEADROOM, 0.0], from).unwrap_or_default();
         let again = usize::from(!knots.is_empty());
         knots.extend(own.into_iter().skip(again));
     }
@@ -52,7 +61,7 @@ pub fn timed(runs: &[SmoothPath], limits: &Limits) -> Vec<Timed> {
 /// `None` where that does not go.
 #[must_use]
 pub(super) fn braked(run: &SmoothPath, limits: &Limits, share: f64) -> Option<Vec<Timed>> {
-    run_knots(run, limits, share, 1.0, 0)
+    run_knots(run, limits, &|_, _, _| f64::INFINITY, [share, 1.0], 0)
 }
 
 /// One grid interval with the piece that it is a part of.
@@ -65,8 +74,8 @@ struct Cell {
 fn run_knots(
     run: &SmoothPath,
     limits: &Limits,
-    share: f64,
-    start: f64,
+    cap: &SpeedCap<'_>,
+    [share, start]: [f64; 2],
     from_ns: u64,
 ) -> Option<Vec<Timed>> {
     let cells = cells(run);
@@ -77,6 +86,10 @@ fn run_knots(
             slope: c.piece.slope,
             bend: c.piece.bend,
             share,
+            caps: [0.0, c.piece.length].map(|s| {
+                let source = c.piece.source[usize::from(s > 0.0)];
+                cap(source, &c.piece.at(s), &c.piece.slope_at(s)).powi(2)
+            }),
         })
         .collect();
     for _ in 0..ROUNDS {

@@ -9,7 +9,7 @@ use crate::cost;
 use crate::motion::jump;
 use crate::plan::{Plan, PlanKnot, Profile, SurfaceSample};
 use crate::progress::Progress;
-use crate::timing::{self, Limits, accelerate};
+use crate::timing::{self, Limits, Pace, paced};
 use crate::verify::{Given, Verification, verify};
 use crate::workcell::{Scene, Stance, Workcell};
 
@@ -95,8 +95,10 @@ pub fn run(
         })
         .ok_or(TransitError::NoWay { tries: TRIES })?;
     let mut plan = assemble(robot, cell, &here, job, &way);
-    if job.profile == Profile::Acceleration {
-        plan = accelerate(&plan, cell, &Limits::of(&arm, job.v_max), &[]);
+    if job.profile.is_curved() {
+        let jerk = (job.profile == Profile::Jerk).then(|| timing::jerks(&arm));
+        let pace = Pace { jerk, ..Pace::default() };
+        plan = paced(&plan, cell, &Limits::of(&arm, job.v_max), &pace);
     }
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };

@@ -9,11 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::collisions::{collisions, standing};
 use super::kinematics::kinematics;
-use super::percentile::percentile;
 use super::press::{Press, press};
 use super::violation::{Violation, ViolationKind};
 use crate::plan::{Plan, PlanError, Stretch};
-use crate::sweep::{Pad, coverage, pad_motion};
+use crate::sweep::{Pad, coverage, pad_motion, percentile};
 use crate::workcell::Scene;
 
 /// The figures of a verified plan.

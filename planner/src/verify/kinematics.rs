@@ -4,7 +4,7 @@ use nullsweep_ipc_types::Knot;
 use nullsweep_robot::{Arm, JointVector};
 
 use super::violation::{Violation, ViolationKind};
-use crate::plan::{Curve, Plan, PlanKnot, Profile};
+use crate::plan::{Curve, Plan, PlanKnot, Profile, TrajectoryCursor};
 
 /// Time between two samples of a plan with limited acceleration. \[ns\]
 const SAMPLE_NS: u64 = 1_000_000;
@@ -12,6 +12,8 @@ const SAMPLE_NS: u64 = 1_000_000;
 const SAMPLE: f64 = SAMPLE_NS as f64 * 1e-9;
 /// What an acceleration may exceed its limit by, as a share of it.
 const ROUNDING: f64 = 1e-6;
+/// What rounding makes of the jerk of samples. \[rad/s³\] or \[m/s³\]
+const DIFFERENCES: f64 = 1e-3;
 
 /// Times, finiteness, velocities and soft limits of every segment.
 pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
@@ -39,11 +41,17 @@ pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
                 let detail = format!("{name}: {velocity:.4} of {:.4}", limits.velocity);
                 report(k, ViolationKind::Velocity, detail);
             }
-            if plan.profile == Profile::Acceleration {
+            if plan.profile.is_curved() {
                 let acceleration = curve.top_acceleration(j);
                 if acceleration > limits.acceleration * (1.0 + ROUNDING) {
                     let detail = format!("{name}: {acceleration:.4} of {:.4}", limits.acceleration);
                     report(k, ViolationKind::Acceleration, detail);
+                }
+            }
+            if let Some(most) = jerk_limit(plan, arm, j) {
+                let jerk = curve.jerk(j).abs();
+                if jerk > most * (1.0 + ROUNDING) + DIFFERENCES {
+                    report(k, ViolationKind::Jerk, format!("{name}: jerk {jerk:.4} of {most:.4}"));
                 }
             }
             let (low, high) = arm.braking_limits(j, velocity);
@@ -57,7 +65,7 @@ pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
             }
         }
     }
-    if plan.profile == Profile::Acceleration {
+    if plan.profile.is_curved() {
         let starts = plan.knots.first().filter(|_| plan.continues.is_none()).map(|k| (0, k));
         let ends = plan.knots.last().map(|k| (plan.knots.len() - 1, k));
         for (k, knot) in starts.into_iter().chain(ends) {
@@ -68,6 +76,7 @@ pub(super) fn kinematics(plan: &Plan, arm: &Arm) -> Vec<Violation> {
         // Samples ask for times that rise.
         if !found.iter().any(|v| v.kind == ViolationKind::TimeOrder) {
             found.extend(sampled(plan, arm));
+            found.extend(jerks(plan, arm));
         }
     }
     found
@@ -112,4 +121,46 @@ fn at(plan: &Plan, time_ns: u64) -> (usize, JointVector) {
     let curve = plan.curve(knot);
     let since = time_ns.saturating_sub(plan.knots[knot - 1].time_ns) as f64 * 1e-9;
     (knot, curve.at(since / curve.seconds()))
+}
+
+/// The jerk that a joint of a plan with limited jerk is to keep within: the plan's, and the URDF's.
+fn jerk_limit(plan: &Plan, arm: &Arm, joint: usize) -> Option<f64> {
+    let own = plan.jerk.map(|jerk| jerk[joint]);
+    let given = arm.limits()[joint].jerk.filter(|_| plan.profile == Profile::Jerk);
+    own.into_iter().chain(given).reduce(f64::min)
+}
+
+/// The jerk of the positions that a controller gets every [`SAMPLE`], by third differences, rest
+/// before the start and after the end included.
+fn jerks(plan: &Plan, arm: &Arm) -> Vec<Violation> {
+    let limits: Vec<(usize, f64)> =
+        (0..arm.dof()).filter_map(|j| Some((j, jerk_limit(plan, arm, j)?))).collect();
+    let (Some(first), Some(last)) = (plan.knots.first(), plan.knots.last()) else {
+        return Vec::new();
+    };
+    if limits.is_empty() {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    let mut cursor = TrajectoryCursor::new(plan.trajectory());
+    // A plan that goes on from another one has no rest before it.
+    let before = if plan.continues.is_none() { 0 } else { 3 };
+    let mut seen = [first.q; 4];
+    for sample in 0..=last.time_ns / SAMPLE_NS + 4 {
+        let (knot, q) = cursor.at((sample * SAMPLE_NS).min(last.time_ns));
+        seen = [seen[1], seen[2], seen[3], q];
+        if sample < before {
+            continue;
+        }
+        for &(j, most) in &limits {
+            let [a, b, c, d] = seen.map(|q| q[j]);
+            let jerk = ((d - c) - 2.0 * (c - b) + (b - a)).abs() / SAMPLE.powi(3);
+            if jerk > most * (1.0 + ROUNDING) + DIFFERENCES {
+                let (name, time_ns) = (&arm.joint_names()[j], sample * SAMPLE_NS);
+                let detail = format!("{name} at {time_ns} ns: sampled jerk {jerk:.4} of {most:.4}");
+                found.push(Violation { knot, kind: ViolationKind::Jerk, detail });
+            }
+        }
+    }
+    found
 }

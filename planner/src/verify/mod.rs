@@ -11,7 +11,6 @@
 mod collisions;
 mod gate;
 mod kinematics;
-mod percentile;
 mod press;
 mod violation;
 

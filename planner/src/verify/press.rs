@@ -7,7 +7,7 @@ use nullsweep_surface::Grid;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::percentile::percentile;
+use crate::sweep::percentile;
 use crate::workcell::Scene;
 
 /// Farthest before it that a point belongs to what the pad lies on. \[m\]

@@ -26,6 +26,8 @@ pub enum ViolationKind {
     /// A joint of a plan with limited acceleration speeds up or slows down by more than its limit,
     /// or is not at rest at the start or the end.
     Acceleration,
+    /// A joint of a plan with limited jerk changes its acceleration faster than its limit.
+    Jerk,
     /// A joint is outside its soft limits with their braking margin at its velocity.
     SoftLimit,
     /// The arm or its tool collides, or the body does where it stands.

@@ -11,6 +11,7 @@ use case::Case;
 use nullsweep_ipc_types::Knot;
 use nullsweep_planner::plan::{Continues, Plan, PlanError, PlanKnot, Profile};
 use nullsweep_planner::verify::{VerifyError, ViolationKind};
+use nullsweep_robot::JointVector;
 use stage::{detour, joint, judge, look, on_the_line, posture, retimed, spoilt, stage, stretched};
 
 /// Ways to break each rule. A new kind does not compile without its own.
@@ -20,6 +21,7 @@ fn cases(kind: ViolationKind) -> Vec<Case> {
         ViolationKind::NotFinite => numbers(),
         ViolationKind::Velocity => speeds(),
         ViolationKind::Acceleration => accelerations(),
+        ViolationKind::Jerk => jerks(),
         ViolationKind::SoftLimit => limits(),
         ViolationKind::Collision => collisions::cases(),
     }
@@ -31,7 +33,8 @@ fn after(kind: ViolationKind) -> Option<ViolationKind> {
         ViolationKind::TimeOrder => ViolationKind::NotFinite,
         ViolationKind::NotFinite => ViolationKind::Velocity,
         ViolationKind::Velocity => ViolationKind::Acceleration,
-        ViolationKind::Acceleration => ViolationKind::SoftLimit,
+        ViolationKind::Acceleration => ViolationKind::Jerk,
+        ViolationKind::Jerk => ViolationKind::SoftLimit,
         ViolationKind::SoftLimit => ViolationKind::Collision,
         ViolationKind::Collision => return None,
     })
@@ -216,6 +219,21 @@ fn accelerations() -> Vec<Case> {
             also: &[ViolationKind::Velocity, ViolationKind::SoftLimit],
             ..Case::new("bang-bang, taken for smooth", mislabelled, 1, " of ")
         },
+    ]
+}
+
+fn jerks() -> Vec<Case> {
+    let s = stage();
+    let within = |jerk: JointVector| Plan { jerk: Some(jerk), ..s.smooth.clone() };
+    let mut one = JointVector::new([1e9; 8]);
+    let j = (0..7)
+        .max_by(|a, b| s.smooth.knots[1].v[*a].abs().total_cmp(&s.smooth.knots[1].v[*b].abs()));
+    let j = j.expect("seven joints");
+    one[j] = 1.0;
+    let of_one = format!("{}: jerk", s.smooth.joints[j]);
+    vec![
+        Case::new("all joints jerk", within(JointVector::new([1.0; 8])), 1, "jerk"),
+        Case::new("one joint jerks", within(one), 1, &of_one[..of_one.len() - 6]),
     ]
 }
 

@@ -102,7 +102,7 @@ const BELOW_3: &[&str] = &["progress", "cost", "workcell", "plan", "roadmap", "s
 #[rustfmt::skip]
 const BELOW_4: &[&str] = &[
     "progress", "cost", "workcell", "plan", "roadmap", "sweep",
-    "tour", "motion", "timing", "verify", "link",
+    "tour", "motion", "fairing", "timing", "verify", "link",
 ];
 
 const PLANNER: &[(&str, &[&str])] = &[
@@ -118,6 +118,7 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("sweep", &["progress", "cost", "workcell", "plan", "roadmap"]),
     ("tour", BELOW_3),
     ("motion", BELOW_3),
+    ("fairing", BELOW_3),
     ("timing", BELOW_3),
     ("verify", &["progress", "cost", "workcell", "plan", "sweep"]),
     ("link", BELOW_3),
@@ -140,7 +141,12 @@ const SURFACE: &[&str] =
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[
     // What is wrong in the search must not be wrong in the verification too.
-    ("planner/src", "verify", &["roadmap", "tour", "motion", "pipeline", "task", "transit"]),
+    (
+        "planner/src",
+        "verify",
+        &["roadmap", "tour", "motion", "fairing", "pipeline", "task", "transit"],
+    ),
+    ("planner/src", "fairing", &["verify"]),
     ("planner/src", "roadmap", &["verify"]),
     ("planner/src", "tour", &["verify"]),
     ("planner/src", "motion", &["verify"]),

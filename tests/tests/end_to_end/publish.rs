@@ -45,6 +45,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         method: Method::Tsp,
         cost: CostKind::Time,
         profile: Profile::Velocity,
+        jerk: None,
         seed: 1,
         knots: (0..sketch.knots.len()).map(knot).collect(),
         patches: Vec::new(),

@@ -69,7 +69,7 @@ fn motion(plan: &Plan, arm: &Arm) -> Motion {
         joints: each(&|k, j| knots[k].q[j]),
         velocities: match plan.profile {
             Profile::Velocity => Vec::new(),
-            Profile::Acceleration => each(&|k, j| knots[k].v[j]),
+            Profile::Acceleration | Profile::Jerk => each(&|k, j| knots[k].v[j]),
         },
         contact: (0..knots.len()).map(|k| plan.on_surface(k)).collect(),
         stops: (0..knots.len() as u32).filter(|k| knots[*k as usize].patch.is_some()).collect(),

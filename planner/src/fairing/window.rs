@@ -1,0 +1,90 @@
+//! How wide a piece is averaged where.
+
+/// Spacing of the places at which widths are kept. \[m\]
+const GRID: f64 = 0.002;
+/// The widest windows, of the pad's place and of its heading and the joints. \[m\]
+const PLACE: f64 = 0.2;
+const POSTURE: f64 = 0.4;
+/// Steepest change of a window's share along the way. \[1/m\]
+const STEEPEST: f64 = 8.0;
+/// Half of the length over which changes of the share are rounded. \[m\]
+const ROUNDED: f64 = 0.02;
+/// A window that would be narrower than this share is none.
+const NARROWEST: f64 = 0.05;
+
+/// The lengths that an average is taken over. \[m\]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Window {
+    /// Of the pad's place and normal.
+    pub(super) place: f64,
+    /// Of its heading and the joints.
+    pub(super) posture: f64,
+}
+
+/// The windows along a piece, as shares of the widest.
+pub(super) struct Windows {
+    length: f64,
+    /// As asked for.
+    asked: Vec<f64>,
+    /// Rounded.
+    shares: Vec<f64>,
+}
+
+impl Windows {
+    /// The widest, along a piece of some length. \[m\]
+    pub(super) fn new(length: f64) -> Self {
+        let count = (length / GRID).ceil().max(1.0) as usize + 1;
+        let whole = vec![1.0; count];
+        Self { length, asked: whole.clone(), shares: whole }
+    }
+
+    /// At a place of it. At its ends there is none, so that it ends where it did.
+    pub(super) fn at(&self, u: f64) -> Window {
+        let last = (self.shares.len() - 1) as f64;
+        let place = (u / self.length * last).clamp(0.0, last);
+        let k = (place as usize).min(self.shares.len().saturating_sub(2));
+        let rest = place - k as f64;
+        let share = self.shares[k] * (1.0 - rest) + self.shares[k + 1] * rest;
+        let room = 2.0 * u.min(self.length - u).max(0.0);
+        let within = |width: f64| match share * width {
+            0.0 => 0.0,
+            _ if room == 0.0 => 0.0,
+            wide => wide * room / (wide.powi(4) + room.powi(4)).powf(0.25),
+        };
+        Window { place: within(PLACE), posture: within(POSTURE) }
+    }
+
+    /// Halves the windows around some places; whether any was left to halve.
+    pub(super) fn narrow(&mut self, places: &[f64]) -> bool {
+        let count = self.asked.len();
+        let spacing = self.length / (count - 1) as f64;
+        let index = |u: f64| ((u / spacing).round() as usize).min(count - 1);
+        let mut indices: Vec<usize> = places.iter().map(|u| index(*u)).collect();
+        indices.dedup();
+        let mut any = false;
+        let was = self.asked.clone();
+        for &k in &indices {
+            let share = was[k];
+            any |= share > 0.0;
+            self.asked[k] = if 0.5 * share < NARROWEST { 0.0 } else { 0.5 * share };
+        }
+        let step = STEEPEST * spacing;
+        for k in 1..count {
+            self.asked[k] = self.asked[k].min(self.asked[k - 1] + step);
+        }
+        for k in (0..count - 1).rev() {
+            self.asked[k] = self.asked[k].min(self.asked[k + 1] + step);
+        }
+        let reach = (ROUNDED / spacing) as usize;
+        self.shares = (0..count)
+            .map(|k| {
+                // Nothing is to be averaged where nothing was asked for.
+                let reach = reach.min(k).min(count - 1 - k);
+                let around = &self.asked[k - reach..=k + reach];
+                let mean = around.iter().sum::<f64>() / around.len() as f64;
+                if self.asked[k] == 0.0 { 0.0 } else { mean }
+            })
+            .collect();
+        any
+    }
+}
