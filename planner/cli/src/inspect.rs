@@ -11,10 +11,10 @@ use nullsweep_robot::MAX_DOF;
 use serde::Serialize;
 
 use crate::exit::OK;
+use crate::figures::pace_rows;
 use crate::json::write_json;
 use crate::numbers::positive;
 use crate::output::say_on;
-use crate::plan::pace_rows;
 use crate::robot::RobotArgs;
 use crate::sheet::sheet;
 

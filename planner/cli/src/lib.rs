@@ -7,6 +7,7 @@ mod choices;
 mod exit;
 mod experiment;
 mod export;
+mod figures;
 mod floor;
 mod goto;
 mod gtsp;

@@ -5,17 +5,14 @@ use std::str::FromStr;
 
 use anyhow::Context;
 use clap::Args;
-use comfy_table::Table;
 use nullsweep_planner::link::Site;
-use nullsweep_planner::pipeline::{self, After, End, Figures, Job, Outcome, StanceChoice};
+use nullsweep_planner::pipeline::{self, After, End, Job, Outcome, StanceChoice};
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
-use nullsweep_planner::sweep::{self, JointPace, Pace};
 use nullsweep_planner::tour::formulation::FormulationConfig;
-use nullsweep_planner::verify::{Against, Verification};
 use nullsweep_planner::workcell::Scene;
-use nullsweep_planner::workcell::stance::{Stance, StanceSearch, told};
+use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
 use nullsweep_report as report;
 use nullsweep_robot::{Robot, Tool};
 use nullsweep_surface::PatchConfig;
@@ -23,16 +20,16 @@ use nullsweep_surface::PatchConfig;
 use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg, SmoothArg};
 use crate::exit::OK;
+use crate::figures::{figures_table, table};
 use crate::jerk::JerkArg;
 use crate::json::write_json;
-use crate::numbers::{Held, Place, finite, not_negative, percent, positive, velocity};
+use crate::numbers::{Held, Place, finite, not_negative, positive, velocity};
 use crate::output::{say, writable};
 use crate::picture::{Sitter, picture};
 use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
-use crate::sheet::sheet;
 use crate::site::SiteArgs;
 
 #[derive(Debug, Args)]
@@ -293,158 +290,6 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
         }
     }
     Ok(code)
-}
-
-/// How the pad lies on the surface, and what the arm was held against, for people.
-pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
-    let mm = |metres: f64| metres * 1e3;
-    let (p, a) = (&v.press, &v.against);
-    let pressed = (mm(p.press_p50_m), mm(p.press_p95_m), mm(p.press_max_m));
-    let facing = (p.facing_p95_rad.to_degrees(), p.facing_max_rad.to_degrees());
-    let found = violations(v.violations.len(), &a.guessed_links);
-    let against = held_against(a);
-    let distance = (mm(v.scan_distance_p95_m), mm(v.scan_distance_max_m));
-    let rows = [
-        ("coverage of reachable points", percent(v.coverage_reachable)),
-        ("coverage of all points", percent(v.coverage_all)),
-        ("line deviation, max", format!("{:.3} mm", mm(v.line_deviation_max_m))),
-        ("distance to the scan, p95, max", format!("{:.2}, {:.2} mm", distance.0, distance.1)),
-        (
-            "pressed in, p50, p95, max",
-            format!("{:.1}, {:.1}, {:.1} mm", pressed.0, pressed.1, pressed.2),
-        ),
-        ("facing, p95, max", format!("{:.0}, {:.0}°", facing.0, facing.1)),
-        ("touching, p50", format!("{:.0} %", 100.0 * p.touching_p50)),
-        ("violations", found),
-        ("  against", against),
-    ];
-    // Without a surface nothing is known of what is swept, pressed and faced.
-    let of_surface =
-        |name: &str| !["line deviation, max", "violations", "  against"].contains(&name);
-    let known = rows.into_iter().filter(|(name, _)| a.surface_points > 0 || !of_surface(name));
-    known.map(|(name, value)| [name.to_owned(), value]).collect()
-}
-
-/// What the arm was held against, for people.
-pub(super) fn held_against(a: &Against) -> String {
-    let unseen = match a.unseen_points {
-        0 => "unseen space free".to_owned(),
-        n => format!("{n} of unseen space"),
-    };
-    let obstacles = if a.obstacles == 1 { "obstacle" } else { "obstacles" };
-    format!(
-        "{} points of the surface, {} others, {} raw, {unseen}, {} {obstacles}{}",
-        a.surface_points,
-        a.other_points,
-        a.raw_points,
-        a.obstacles,
-        a.but_for()
-    )
-}
-
-/// How many violations were found, and for how many links that is a guess.
-pub(super) fn violations(count: usize, guessed: &[String]) -> String {
-    match guessed {
-        [] => count.to_string(),
-        [first, rest @ ..] => {
-            let more =
-                if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
-            format!("{count}, by a guess: capsules stand for the meshes of {first}{more}")
-        }
-    }
-}
-
-/// The figures as name and value, for people.
-fn rows(f: &Figures) -> Vec<[String; 2]> {
-    let v = &f.verification;
-    let mut rows = Vec::new();
-    let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
-    row("points", f.points.to_string());
-    row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
-    row("fill-in patches, strokes", format!("{}, {}", f.fill_in_patches, f.strokes));
-    row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
-    row("base x, y, yaw", told(&f.base));
-    for (name, position) in &f.held {
-        row(name, format!("{position:.3}"));
-    }
-    row("effort", format!("{:.2} rad", f.effort_rad));
-    row("task time", format!("{:.2} s", f.task_time_s));
-    row("distance on the surface", format!("{:.2} m", f.distance_m));
-    row("distance in transfers", format!("{:.2} m", f.transfer_m));
-    rows.extend(pace_rows(&f.pace));
-    if let Some(held) = &f.tool_speed {
-        rows.extend(held_rows(held));
-    }
-    let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
-    let passes = format!("{:.0}, {:.0}", f.passes.passes_p50, f.passes.passes_p95);
-    row("passes over a point, p50, p95", passes);
-    row("jumps", f.jumps.to_string());
-    row("dropped patches", f.dropped_patches.to_string());
-    row("knots", f.knots.to_string());
-    rows.extend(verified_rows(v));
-    if !f.left_out.is_empty() {
-        rows.push(["not swept, by what is in the way".to_owned(), String::new()]);
-        rows.extend(f.left_out.iter().map(|left| [format!("  {}", left.cause), left.to_string()]));
-    }
-    let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
-    row("calculation", format!("{:.2} s", f.calc_time_total_s));
-    for (stage, seconds) in &f.calc_time_s {
-        row(&format!("  {stage}"), format!("{seconds:.2} s"));
-    }
-    rows
-}
-
-/// How fast a plan goes along its path, for people.
-pub(super) fn pace_rows(p: &Pace) -> Vec<[String; 2]> {
-    let (p5, p50, p95) = (p.tool_speed_p5, p.tool_speed_p50, p.tool_speed_p95);
-    let largest = |of: fn(&JointPace) -> f64| p.joints.iter().map(of).fold(0.0, f64::max);
-    let shares: Vec<String> =
-        p.joints.iter().map(|j| format!("{:.0}", 100.0 * j.effort_share)).collect();
-    [
-        ("time on the surface", format!("{:.2} s", p.contact_s)),
-        ("tool speed, p5, p50, p95", format!("{p5:.3}, {p50:.3}, {p95:.3} m/s")),
-        ("dips below", format!("{:.2} m/s: {}", p.dip_speed, p.dips)),
-        ("acceleration, max", format!("{:.1} rad/s²", largest(|j| j.acceleration))),
-        ("jerk, max", format!("{:.0} rad/s³", largest(|j| j.jerk))),
-        ("effort by joint, base to tip", format!("{} %", shares.join(", "))),
-    ]
-    .map(|(name, value)| [name.to_owned(), value])
-    .into()
-}
-
-/// How well a tool speed is held, for people.
-fn held_rows(held: &sweep::Held) -> Vec<[String; 2]> {
-    let mut rows = vec![[
-        format!("tool speed of {} m/s held", held.speed),
-        format!("{} of the length", percent(held.share)),
-    ]];
-    rows.extend(held.slower.iter().map(|s| {
-        let [x, y, z] = s.at;
-        let place = format!("{x:.3}, {y:.3}, {z:.3}");
-        let what = format!(
-            "at {:.2} s, {place} m: down to {:.3} m/s over {:.0} mm, by {}",
-            s.time_s,
-            s.speed,
-            1e3 * s.length_m,
-            s.joint
-        );
-        ["  slower".to_owned(), what]
-    }));
-    rows
-}
-
-fn table(figures: &Figures) -> Table {
-    let mut table = sheet(["figure", "value"]);
-    table.add_rows(rows(figures));
-    table
-}
-
-fn figures_table(figures: &Figures) -> report::Table {
-    report::Table {
-        title: "Figures".into(),
-        columns: vec!["figure".into(), "value".into()],
-        rows: rows(figures).into_iter().map(Vec::from).collect(),
-    }
 }
 
 fn job(

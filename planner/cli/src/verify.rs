@@ -11,9 +11,9 @@ use nullsweep_planner::workcell::Scene;
 
 use crate::bars::Bars;
 use crate::exit::{OK, VIOLATIONS};
+use crate::figures::verified_rows;
 use crate::json::write_json;
 use crate::output::{say, writable};
-use crate::plan::verified_rows;
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
 use crate::scene::{Demo, SceneArgs, scene};

@@ -15,10 +15,10 @@ use nullsweep_surface::room::Room;
 
 use crate::bars::Bars;
 use crate::exit::{OK, Usage};
+use crate::figures::verified_rows;
 use crate::output::{say, tell, writable};
 use crate::picture::{Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
-use crate::plan::verified_rows;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
 use crate::scene_command;
