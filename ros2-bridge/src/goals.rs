@@ -47,6 +47,9 @@ pub struct Goals<Id, Asker> {
     all: Vec<Goal<Id, Asker>>,
 }
 
+/// Who asked for a goal's end, and the goal that has one.
+type Told<'a, Id, Asker> = (Asker, &'a Goal<Id, Asker>);
+
 impl<Id, Asker> Default for Goals<Id, Asker> {
     fn default() -> Self {
         Self { all: Vec::new() }
@@ -113,11 +116,7 @@ impl<Id: Copy + PartialEq, Asker> Goals<Id, Asker> {
 
     /// Somebody asks for a goal's end: told at once where it has one, else then. Given back with its
     /// goal where it can be told; `Err` where the goal is not known.
-    pub fn ask(
-        &mut self,
-        id: Id,
-        asker: Asker,
-    ) -> Result<Option<(Asker, &Goal<Id, Asker>)>, Asker> {
+    pub fn ask(&mut self, id: Id, asker: Asker) -> Result<Option<Told<'_, Id, Asker>>, Asker> {
         match self.all.iter_mut().find(|goal| goal.id == id) {
             None => Err(asker),
             Some(goal) if goal.status.is_end() => Ok(Some((asker, goal))),

@@ -13,6 +13,7 @@ mod link;
 mod messages;
 mod serve;
 mod trajectory;
+mod wish;
 
 use std::process::ExitCode;
 

@@ -110,21 +110,7 @@ pub fn run(
     let best = search(&planning, patches, samples, &mut clock)?;
     let Attempt { patches, graph, sequence, mut plan, .. } = best;
     planning.leave(&mut plan);
-    if job.smooth {
-        progress.stage("fairing", None);
-        let keep = Keep { scan, points: planning.to_sweep };
-        plan = clock.time("fairing", || fair(&plan, cell, &bed, keep));
-        timing::set_times(&mut plan.knots, &planning.velocity);
-    }
-    if job.profile.is_curved() {
-        progress.stage("timing", None);
-        let pace = pace(job, &arm, progress);
-        let limits = Limits::of(&arm, job.v_max);
-        plan = clock.time("timing", || paced(&plan, cell, &limits, &pace));
-        if let Some(rest) = rest {
-            plan = rest.then(plan);
-        }
-    }
+    let plan = moved(&planning, plan, rest, &mut clock);
 
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
@@ -159,6 +145,27 @@ pub fn run(
     reachable.resize(patches.len(), true);
     let scan = here.surface;
     Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
+}
+
+/// The plan as it is gone along: made smooth and timed as the job asks, after what comes to rest first.
+fn moved(of: &Planning<'_>, mut plan: Plan, rest: Option<Rest>, clock: &mut Clock) -> Plan {
+    let Planning { job, cell, progress, .. } = *of;
+    if job.smooth {
+        progress.stage("fairing", None);
+        let keep = Keep { scan: of.scan, points: of.to_sweep };
+        plan = clock.time("fairing", || fair(&plan, cell, of.bed, keep));
+        timing::set_times(&mut plan.knots, &of.velocity);
+    }
+    if job.profile.is_curved() {
+        progress.stage("timing", None);
+        let pace = pace(job, cell.arm, progress);
+        let limits = Limits::of(cell.arm, job.v_max);
+        plan = clock.time("timing", || paced(&plan, cell, &limits, &pace));
+        if let Some(rest) = rest {
+            plan = rest.then(plan);
+        }
+    }
+    plan
 }
 
 /// What the plan keeps to besides velocity and acceleration.

@@ -4,7 +4,7 @@ use nullsweep_robot::{JointVector, MAX_DOF};
 
 use super::super::Limits;
 use super::super::sampled::Timed;
-use super::Place;
+use super::reference::Place;
 
 /// A uniform cubic B-spline in time.
 pub(super) struct Spline {

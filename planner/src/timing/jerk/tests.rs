@@ -1,4 +1,5 @@
 use super::*;
+use crate::plan::Curve;
 use crate::timing::{Piece, SmoothPath, timed};
 
 fn lane(values: &[f64]) -> JointVector {

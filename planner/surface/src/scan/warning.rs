@@ -171,6 +171,16 @@ pub enum Rest {
     Ignored,
 }
 
+impl fmt::Display for Rest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Normals => "the last three, unit vectors, for the normal",
+            Self::Colour => "the last three, no unit vectors, for a colour",
+            Self::Ignored => "the others ignored",
+        })
+    }
+}
+
 impl fmt::Display for ScanWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -217,16 +227,8 @@ impl fmt::Display for ScanWarning {
                 write!(f, "{place} skipped: it is neither a point nor names columns x, y, z")
             }
             Self::Unnamed { first, rest } => {
-                write!(
-                    f,
-                    "the columns have no names: {first} to {} taken for x, y, z, ",
-                    first + 2
-                )?;
-                match rest {
-                    Rest::Normals => write!(f, "the last three, unit vectors, for the normal"),
-                    Rest::Colour => write!(f, "the last three, no unit vectors, for a colour"),
-                    Rest::Ignored => write!(f, "the others ignored"),
-                }
+                let last = first + 2;
+                write!(f, "the columns have no names: {first} to {last} taken for x, y, z, {rest}")
             }
             Self::IndexColumn => {
                 write!(f, "the first column has no name and was taken for the rows' index")
