@@ -433,8 +433,7 @@ impl Server {
         while self.running.is_some() && began.elapsed() < LAST {
             std::thread::sleep(ROUND);
             if self.hear(door).is_err() {
-                // The stop may be asked for all the same.
-                tracing::error!("the executor cannot be heard");
+                tracing::error!("the executor cannot be heard, and is asked to stop all the same");
                 std::thread::sleep(ROUND * 20);
             }
             self.brake();
