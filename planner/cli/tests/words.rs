@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use nullsweep_planner::plan::{Plan, PlanKnot};
+use nullsweep_planner::plan::{Continues, Plan, PlanKnot};
 use nullsweep_robot::{ArmSpec, JointVector, Robot, Side, Tool};
 
 fn planner(folder: &Path, args: &str) -> Command {
@@ -44,6 +44,21 @@ fn a_posture_with_too_few_joints_is_wrong_usage() {
     let (code, _, said) = run(folder.path(), "plan --demo chair-seat --start nowhere");
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("no posture `nowhere`"), "{said}");
+}
+
+/// A plan that goes on from a knot of another one joins that one in motion: no arm is brought to rest at
+/// its start and the plan refused then.
+#[test]
+fn the_arm_is_not_brought_to_a_plan_that_it_cannot_begin() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.json");
+    long_plan(&path);
+    let mut plan = Plan::read(&path).expect("a plan");
+    plan.continues = Some(Continues { digest: 7, knot: 3 });
+    plan.sealed().write(&path).expect("written");
+    let (code, _, said) = run(folder.path(), "publish plan.json --goto --empty --yes");
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("leave out --goto, or give --join stop"), "{said}");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! Coverage does not ask for the patches' centres: a pad of 7 × 10 cm passes over them anyway. So
 //! each contact piece, from where the tool is set down to where it is lifted off, is averaged along
 //! its length: the pad's place and normal over a window of some centimetres, its heading and the
-//! joints over a wider one ([`Piece`](piece::Piece)). The joints are then brought onto the averaged
+//! joints over a wider one (`Piece`). The joints are then brought onto the averaged
 //! pose by the least motion, so that what they do in the null space is averaged too. Where that
 //! does not go, collides, or sweeps too little, the window is narrowed and the piece made again;
 //! without a window it is what it was.
@@ -62,8 +62,11 @@ pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan 
         }
         let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);
         let lost: Vec<_> = lost.map(|i| keep.scan.points[i]).collect();
-        for fair in &mut pieces {
-            fair.give_back(&lost, 0.5 * cell.tool.width.hypot(cell.tool.length));
+        let reach = 0.5 * cell.tool.width.hypot(cell.tool.length);
+        let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, reach));
+        if given.filter(|given| *given).count() == 0 {
+            // What is lost is near none of them: who knows why, so all is as it was.
+            return plan.clone();
         }
     }
 }
@@ -103,16 +106,18 @@ impl Fair {
         self.made = Some(Vec::new());
     }
 
-    /// Narrows the windows wherever the piece as it was came near to what is swept no more.
-    fn give_back(&mut self, lost: &[nalgebra::Point3<f64>], reach: f64) {
+    /// Narrows the windows wherever the piece as it was came near to what is swept no more; whether
+    /// there was anything to narrow.
+    fn give_back(&mut self, lost: &[nalgebra::Point3<f64>], reach: f64) -> bool {
         let mut places: Vec<f64> =
             lost.iter().filter_map(|point| self.piece.nearest(point, reach)).collect();
         places.sort_by(f64::total_cmp);
         places.dedup_by(|b, a| *b - *a < 0.005);
         if self.made.as_ref().is_some_and(Vec::is_empty) || places.is_empty() {
-            return;
+            return false;
         }
         self.made = if self.windows.narrow(&places) { None } else { Some(Vec::new()) };
+        true
     }
 }
 

@@ -11,7 +11,7 @@ use crate::roadmap::Blocked;
 use crate::workcell::Sample;
 
 /// Motions of one arm in one workcell, at one cost and with one seed. Whatever makes a motion
-/// depends on its [`Key`] alone, so a plan is the same with it as without.
+/// depends on its `Key` alone, so a plan is the same with it as without.
 pub struct Memo {
     pub(super) seed: u64,
     /// Along the surface, the redundancy parameter changing evenly.
