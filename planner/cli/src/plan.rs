@@ -53,7 +53,7 @@ pub(super) struct PlanArgs {
     /// ° or deg behind them), or `auto`: where it reaches most.
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     base: Base,
-    /// Height of the PR2's torso joint, with a given base. [m]
+    /// Height of the PR2's torso joint; without it `--base auto` chooses it too. [m]
     #[arg(long, value_name = "M", value_parser = finite)]
     torso: Option<f64>,
     /// Position of another held joint: NAME=VALUE.
@@ -313,8 +313,15 @@ fn job(
         (None, Base::Auto) => {
             let mut search =
                 StanceSearch { held: held(args), ..StanceSearch::of(robot, &arm, &tool) };
-            if args.torso.is_some() {
-                search.lift = None;
+            if let Some((lift, _)) = search.lift.clone() {
+                if search.held.iter().any(|(name, _)| *name == lift) {
+                    search.lift = None;
+                } else {
+                    bars.note(&format!(
+                        "{lift} is chosen with the base, and is to be moved there before the plan \
+                         runs: --held {lift}=VALUE says where it stands"
+                    ));
+                }
             }
             if arm.has_numeric_ik() {
                 bars.note(

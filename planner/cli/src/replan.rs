@@ -65,7 +65,7 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
         let after = After { plan: running.clone(), knot, held, again: false };
         let (made, plan) = make(&args.plan, site, Some(after)).map_err(|e| format!("{e:#}"))?;
         code = made;
-        if code == VIOLATIONS { Err("it breaks a rule".to_owned()) } else { Ok(plan) }
+        if code == VIOLATIONS { Err("it breaks a rule".to_owned()) } else { Ok(plan.sealed()) }
     };
     let done = replan(site, &running, args.lead, patience, &mut from, &mut |event: &PlanEvent| {
         tell!("{}", describe(event));
