@@ -107,7 +107,8 @@ struct RunArgs {
     /// Acceleration of stops, pauses and changes of speed along the path, each joint. [rad/s²]
     #[arg(long, default_value_t = 10.0)]
     stop_acceleration: f64,
-    /// Folder for the flight recorder: two files that take turns.
+    /// Folder for the flight recorder: two files that take turns; those of the run before stay as
+    /// before-0 and before-1.
     #[arg(long, value_name = "FOLDER")]
     record: Option<PathBuf>,
     /// Size of each of them; 1 MiB holds about 2.5 s.

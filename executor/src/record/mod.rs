@@ -4,7 +4,8 @@
 //! The loop hands each cycle on through a wait-free queue; the worker writes. A recording begins
 //! with the loop's memory at a moment without plans. Two files take turns, so the newest part is
 //! always there and the disk does not fill: when one has its size, the recorder changes over at
-//! the next moment without plans.
+//! the next moment without plans. What an executor before this one has left stays, under other names,
+//! until the next one begins.
 
 mod format;
 mod replay;
@@ -100,6 +101,7 @@ impl Recorder {
     /// Records into `folder`, two files of about `limit` bytes each, what is put on the tape.
     pub(crate) fn new(folder: &Path, limit: u64, guard: Guard) -> io::Result<(Self, Tape)> {
         fs::create_dir_all(folder)?;
+        set_aside(folder)?;
         let (cycle, cycles) = RingBuffer::new(WAITING);
         let (checkpoint, checkpoints) = RingBuffer::new(1);
         let shared = Arc::new(Shared { wanted: AtomicBool::new(true), lost: AtomicU64::new(0) });
@@ -215,6 +217,26 @@ impl Recorder {
         self.buffer.clear();
         Ok(())
     }
+}
+
+/// Keeps what was recorded before under other names, in place of what these named.
+fn set_aside(folder: &Path) -> io::Result<()> {
+    let names = [0, 1].map(|turn| {
+        [format!("flight-{turn}.nswrec"), format!("before-{turn}.nswrec")]
+            .map(|name| folder.join(name))
+    });
+    if !names.iter().any(|[flight, _]| flight.exists()) {
+        return Ok(());
+    }
+    for [flight, before] in &names {
+        if flight.exists() {
+            fs::rename(flight, before)?;
+            tracing::info!("the recording before this one is {}", before.display());
+        } else if before.exists() {
+            fs::remove_file(before)?;
+        }
+    }
+    Ok(())
 }
 
 fn put_plan(to: &mut Vec<u8>, plan: &ValidPlan) {

@@ -11,6 +11,27 @@ use crate::testing::{HOME, MS, moved, plan};
 use crate::{Driver, Loopback, Slots};
 
 #[test]
+fn what_an_executor_before_has_recorded_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let begin = || drop(Recorder::new(folder.path(), 1 << 20, pr2()).unwrap());
+    std::fs::write(at("flight-0.nswrec"), "first").unwrap();
+    std::fs::write(at("flight-1.nswrec"), "second").unwrap();
+    begin();
+    assert!(!at("flight-0.nswrec").exists());
+    assert_eq!(std::fs::read(at("before-0.nswrec")).unwrap(), b"first");
+    assert_eq!(std::fs::read(at("before-1.nswrec")).unwrap(), b"second");
+    // One that recorded nothing takes nothing away.
+    begin();
+    assert!(at("before-0.nswrec").exists() && at("before-1.nswrec").exists());
+    // Parts of two executors do not stand beside each other.
+    std::fs::write(at("flight-0.nswrec"), "third").unwrap();
+    begin();
+    assert_eq!(std::fs::read(at("before-0.nswrec")).unwrap(), b"third");
+    assert!(!at("before-1.nswrec").exists());
+}
+
+#[test]
 fn a_setpoint_that_differs_in_one_bit_is_found() {
     let folder = tempfile::TempDir::new().unwrap();
     let guard = pr2();
