@@ -230,9 +230,10 @@ impl CheckArgs {
         };
         let files = self.robot.files();
         let mut text = String::from(
-            "# Which robot is meant, and what is around it, for all programs of Nullsweep. They find\n\
-             # this file in the folder where they are started and above; what is given on the command\n\
-             # line wins. Paths are from this file's folder on, lengths in m, angles in rad.\n\n",
+            "# Which robot is meant, and what is around it, for planner, executor, mock-hardware and\n\
+             # conformance. They find this file in the folder where they are started and above; what is\n\
+             # given on the command line wins. Paths are from this file's folder on, lengths in m, angles\n\
+             # in rad.\n\n",
         );
         let mut put = |about: &str, name: &str, value: Option<String>, example: &str| {
             let line = value.map_or(format!("# {name} = {example}"), |v| format!("{name} = {v}"));

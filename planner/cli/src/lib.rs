@@ -86,7 +86,7 @@ enum Command {
     Export(export::ExportArgs),
     /// The paper's tables I and II, our figures beside the published ones.
     Experiment(Box<experiment::ExperimentArgs>),
-    /// Write or check a cell file, which says once which robot and scene all programs mean.
+    /// Write or check a cell file, which says once which robot and scene are meant.
     Cell(Box<cell::CellArgs>),
     /// Say what a plan file holds.
     Inspect(inspect::InspectArgs),

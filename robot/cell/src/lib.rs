@@ -1,4 +1,4 @@
-//! What the command lines of all programs share: the cell file, which says once which robot, tool and
+//! What the command lines of the programs share: the cell file, which says once which robot, tool and
 //! scene are meant, and how a program tells another one what it can be asked for.
 //!
 //! It knows no robot and no planner: a cell is names of files and numbers, which become defaults of
