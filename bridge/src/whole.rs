@@ -111,7 +111,7 @@ impl Whole {
             guard: Guard::new(arm.limits()),
             fingerprint: arm.fingerprint(),
             held_continuous: arm.held_joints().iter().map(|h| turns(&h.name)).collect(),
-            held_tolerance: Rules::HELD_TOLERANCE,
+            held_tolerance: Guard::HELD_TOLERANCE,
             since_ns: now_ns(),
         };
         Ok(Self {

@@ -9,10 +9,10 @@ use std::sync::atomic::AtomicU64;
 
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand};
+use nullsweep_cell::{as_called, causes};
 use nullsweep_ipc_types::{HISTOGRAM_BUCKETS, bucket_upper_ns};
 use nullsweep_robot::{Arm, ArmSpec, Robot};
 
-use crate::admit::Rules;
 use crate::alarm::Alarm;
 use crate::ctl::{self, CtlArgs};
 use crate::executor::{Config, Summary, quantile_ns, run};
@@ -88,9 +88,9 @@ struct RunArgs {
     /// How far a plan's first knot may be from where the arm holds. [rad]
     #[arg(long, default_value_t = Guard::START_TOLERANCE)]
     start_tolerance: f64,
-    /// How far a held joint (torso, other arm) may be from where a plan takes it; twice that far
-    /// it may move while the plan runs. [rad or m]
-    #[arg(long, default_value_t = Rules::HELD_TOLERANCE)]
+    /// How far a held joint (torso, other arm) may be from where a plan takes it; as far again it may
+    /// move while the plan runs. Plans keep 5 mm clear: both together should stay below. [rad or m]
+    #[arg(long, default_value_t = Guard::HELD_TOLERANCE)]
     held_tolerance: f64,
     /// Following error that is allowed at stand-still. [rad]
     #[arg(long, default_value_t = 0.1)]
@@ -148,7 +148,7 @@ where
         // Whoever reads the output has read enough.
         Err(e) if e.chain().any(is_broken_pipe) => ExitCode::from(BROKEN_PIPE),
         Err(e) => {
-            last_words(&format!("executor: {}", nullsweep_cell::causes(e.as_ref())));
+            last_words(&as_called(format!("executor: {}", causes(e.as_ref()))));
             ExitCode::from(if e.is::<Usage>() { 2 } else { 1 })
         }
     }
@@ -228,7 +228,7 @@ fn config(args: &RunArgs, arm: &Arm) -> anyhow::Result<Config> {
         start_tolerance: positive("--start-tolerance", args.start_tolerance)?,
         stale_ns: nanos("--stale-ms", args.stale_ms)?,
         lost_ns: nanos("--lost-ms", args.lost_ms)?,
-        held_drift: 2.0 * positive("--held-tolerance", args.held_tolerance)?,
+        held_drift: positive("--held-tolerance", args.held_tolerance)?,
         following_error: positive("--following-error", args.following_error)?,
         following_lag: from_zero("--following-lag", args.following_lag, 10.0)?,
         goal_tolerance: positive("--goal-tolerance", args.goal_tolerance)?,

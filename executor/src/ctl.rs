@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use nullsweep_cell::as_called;
 use nullsweep_ipc_types::ports::{Ipc, IpcError, within};
 use nullsweep_ipc_types::{CommandKind, Fault, Mode, Response, Verdict};
 
@@ -90,15 +91,15 @@ pub(crate) fn command(args: &CtlArgs) -> anyhow::Result<ExitCode> {
         .and_then(|answer| Ok(answer?));
     match (response, signalled) {
         (Ok(response), _) => {
-            tell(&Answer(&response).to_string());
+            tell(&as_called(Answer(kind, &response).to_string()));
             let accepted = Verdict::from_wire(response.verdict) == Some(Verdict::Accepted);
             Ok(if accepted { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
         (Err(e), Some(running)) => {
             tell(&format!("stop sent to process {} as a signal", running.pid));
-            last_words(&format!(
+            last_words(&as_called(format!(
                 "executor: the stop was sent, but how it was taken is not known: {e:#}"
-            ));
+            )));
             Ok(ExitCode::SUCCESS)
         }
         (Err(e), None) => Err(e),
@@ -120,16 +121,26 @@ fn tell(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
-/// A response in words.
-struct Answer<'a>(&'a Response);
+/// The answer to a command, in words: how the command was taken, then what the executor does.
+struct Answer<'a>(CommandKind, &'a Response);
 
 impl std::fmt::Display for Answer<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let response = self.0;
-        let unknown = "unknown";
-        let verdict = Verdict::from_wire(response.verdict).map_or(unknown, Verdict::text);
-        let mode = Mode::from_wire(response.mode).map_or(unknown, Mode::text);
-        write!(f, "{verdict}: {mode}")?;
+        let Self(asked, response) = self;
+        let verdict = Verdict::from_wire(response.verdict);
+        if *asked != CommandKind::Status || verdict != Some(Verdict::Accepted) {
+            write!(f, "{asked}: {}; ", verdict.map_or("unknown answer", Verdict::text))?;
+        }
+        let doing = match Mode::from_wire(response.mode) {
+            Some(Mode::Init) => "waiting for a sound state of the endpoint",
+            Some(Mode::Hold) => "holding, no plan runs",
+            Some(Mode::Executing) => "executing",
+            Some(Mode::Paused) => "paused on the path, `executor ctl resume` goes on",
+            Some(Mode::Stopping) => "stopping on the path",
+            Some(Mode::Fault) => "holding in a fault, `executor ctl reset` clears it",
+            None => "in an unknown mode",
+        };
+        f.write_str(doing)?;
         match Fault::from_wire(response.fault) {
             Some(Fault::None) => {}
             Some(fault) => write!(f, ", {fault}")?,
@@ -152,14 +163,32 @@ mod tests {
 
     use super::*;
 
+    fn said(asked: CommandKind, response: &Response) -> String {
+        Answer(asked, response).to_string()
+    }
+
     #[test]
     fn a_plan_that_is_not_verified_is_told() {
         let plan = PlanId { epoch: 0xabc, number: 2 };
         let mode = Mode::Executing.wire();
         let verified = Response { plan, mode, speed_scale: 1.0, knot: 3, ..Response::zeroed() };
-        let text = Answer(&verified).to_string();
-        assert_eq!(text, "accepted: executing, plan abc/2 at knot 3, speed 100 %");
-        let text = Answer(&Response { unverified: 1, ..verified }).to_string();
+        let text = said(CommandKind::Status, &verified);
+        assert_eq!(text, "executing, plan abc/2 at knot 3, speed 100 %");
+        let text = said(CommandKind::Status, &Response { unverified: 1, ..verified });
         assert!(text.contains("plan abc/2 at knot 3 (NOT VERIFIED), speed"), "{text}");
+    }
+
+    #[test]
+    fn what_was_accepted_is_the_command_and_never_a_plan() {
+        let holds = Response { mode: Mode::Hold.wire(), speed_scale: 0.5, ..Response::zeroed() };
+        let text = said(CommandKind::Status, &holds);
+        assert_eq!(text, "holding, no plan runs, speed 50 %");
+        let text = said(CommandKind::Speed, &holds);
+        assert_eq!(text, "speed: accepted; holding, no plan runs, speed 50 %");
+        let refused = Response { verdict: Verdict::WrongMode.wire(), ..holds };
+        let text = said(CommandKind::Resume, &refused);
+        assert!(text.starts_with("resume: not possible in this mode; holding"), "{text}");
+        let busy = Response { verdict: Verdict::Busy.wire(), ..holds };
+        assert!(said(CommandKind::Status, &busy).starts_with("status: busy; "));
     }
 }

@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
+use nullsweep_cell::as_called;
 use nullsweep_ipc_types::ports::{CommandServer, PortError, Request, now_ns};
 use nullsweep_ipc_types::service::{COMMAND_CLIENTS, COMMAND_REQUESTS};
 use nullsweep_ipc_types::{Command, CommandKind, Fault, Mode, PlanId, Response, Verdict};
@@ -128,11 +129,12 @@ impl Asked {
         if waited >= TAKE_WITHIN + ANSWER_WITHIN {
             // Whether it is carried out is not known here: no answer is the true one.
             let kind = CommandKind::from_wire(self.request.command().kind);
-            tracing::error!(
+            let text = format!(
                 "the loop took {} and has not answered it: `executor ctl status` says whether it was \
                  carried out; if that is not answered either, stop with `executor ctl stop`",
-                kind.map_or_else(|| "a command".into(), |kind| format!("{kind:?}"))
+                kind.map_or("a command", CommandKind::text)
             );
+            tracing::error!("{}", as_called(text));
             return None;
         }
         Some(self)

@@ -82,6 +82,10 @@ impl Guard {
     pub const APPROACH: f64 = 0.1;
     /// Default of [`Self::goal_tolerance`]. \[rad\]
     pub const GOAL_TOLERANCE: f64 = 0.02;
+    /// Default of [`Self::held_drift`], and of how far a held joint may be from where a plan takes it. A
+    /// torso moves the whole arm by as much, and another arm's joint its hand by about as much: both
+    /// together are less than the 5 mm that plans are proven to keep clear. \[rad\] or \[m\]
+    pub const HELD_TOLERANCE: f64 = 0.002;
 
     /// Guards these joints with the default parameters at a 1 kHz cycle. At most
     /// [`MAX_DOF`] joints are used.
@@ -111,7 +115,7 @@ impl Guard {
             join_tolerance: 1e-9,
             stale_ns: 20_000_000,
             lost_ns: 100_000_000,
-            held_drift: 0.02,
+            held_drift: Self::HELD_TOLERANCE,
             following_error: 0.1,
             following_lag: 0.15,
             goal_tolerance: Self::GOAL_TOLERANCE,

@@ -27,7 +27,7 @@ pub(crate) fn rules(guard: &Guard) -> Rules {
         guard: *guard,
         fingerprint: FINGERPRINT,
         held_continuous: vec![false, true],
-        held_tolerance: Rules::HELD_TOLERANCE,
+        held_tolerance: Guard::HELD_TOLERANCE,
         since_ns: 100,
     }
 }

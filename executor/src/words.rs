@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use nullsweep_cell::as_called;
 use nullsweep_ipc_types::{
     Command, CommandKind, EventKind, Fault, Mode, Reason, Response, Verdict,
 };
@@ -61,7 +62,7 @@ impl Words {
                 let _ = write!(text, "; {remedy}");
             }
         }
-        text
+        as_called(text)
     }
 
     /// Where a rule is broken and by how much.
@@ -129,7 +130,7 @@ impl Words {
             );
         }
         let _ = write!(text, "; {}", self.cure(now.fault));
-        text
+        as_called(text)
     }
 
     /// What the executor waits for in [`Mode::Init`].
@@ -139,13 +140,13 @@ impl Words {
             other => other.text(),
         };
         let robot = &self.robot;
-        match now.fault {
+        as_called(match now.fault {
             Fault::None | Fault::StaleState => format!(
                 "waiting for the hardware endpoint: {cause}; start one for robot `{robot}` \
                  (--robot-name) under the same --ipc-root"
             ),
             other => format!("waiting for the hardware endpoint: {cause}; {}", self.cure(other)),
-        }
+        })
     }
 
     fn cure(&self, fault: Fault) -> String {
@@ -188,8 +189,7 @@ impl Words {
                 );
             }
             Fault::HeldJoint => {
-                "keep torso and other arm still, then publish again; the bound is twice \
-                 --held-tolerance"
+                "keep torso and other arm still, then publish again; the bound is --held-tolerance"
             }
         };
         text.into()
@@ -221,7 +221,7 @@ pub(crate) fn command(command: &Command, response: &Response) -> String {
         }
         Verdict::Busy => "; ask again",
     };
-    text
+    as_called(text)
 }
 
 /// What to do about a plan that was refused or ended early.

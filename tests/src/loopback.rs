@@ -44,7 +44,7 @@ impl Loopback {
             guard,
             fingerprint: arm.fingerprint(),
             held_continuous: vec![false; arm.held_joints().len()],
-            held_tolerance: Rules::HELD_TOLERANCE,
+            held_tolerance: Guard::HELD_TOLERANCE,
             since_ns: start_ns,
         };
         Ok(Self {

@@ -56,7 +56,7 @@ fn plan(
         guard: guard(),
         fingerprint: 7,
         held_continuous: Vec::new(),
-        held_tolerance: Rules::HELD_TOLERANCE,
+        held_tolerance: Guard::HELD_TOLERANCE,
         since_ns: 100,
     };
     let held = Held { positions: [0.0; MAX_HELD_JOINTS], count: 0 };

@@ -45,15 +45,11 @@ pub struct Rules {
     pub fingerprint: u64,
     /// For each held joint whether whole turns make no difference.
     pub held_continuous: Vec<bool>,
-    /// How far a held joint may be from where the plan takes it. \[rad\] or \[m\]
+    /// How far a held joint may be from where the plan takes it, see [`Guard::HELD_TOLERANCE`]. \[rad\]
+    /// or \[m\]
     pub held_tolerance: f64,
     /// When this executor started. \[ns\]
     pub since_ns: u64,
-}
-
-impl Rules {
-    /// Default of [`Self::held_tolerance`]. \[rad\] or \[m\]
-    pub const HELD_TOLERANCE: f64 = 0.01;
 }
 
 /// Checks a private copy of a plan. `held` is where the held joints stand now, `None` while no

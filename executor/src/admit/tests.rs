@@ -62,7 +62,7 @@ const SEALED: &[Case] = &[
     ("another robot", |h, _| h.fingerprint ^= 1, Reason::Robot, None, None),
     ("another arm", |h, _| h.joint_count = 6, Reason::Robot, None, None),
     ("held count", |h, _| h.held_count = 1, Reason::HeldJoint, Some(1), None),
-    ("torso", |h, _| h.held_positions[0] += 0.02, Reason::HeldJoint, Some(0), None),
+    ("torso", |h, _| h.held_positions[0] += 0.003, Reason::HeldJoint, Some(0), None),
     ("held NaN", |h, _| h.held_positions[1] = f64::NAN, Reason::HeldJoint, Some(1), None),
     ("NaN", |_, k| k[2].positions[3] = f64::NAN, Reason::NotFinite, Some(3), Some(2)),
     ("infinite", |_, k| k[4].velocities[6] = f64::INFINITY, Reason::NotFinite, Some(6), Some(4)),
@@ -197,7 +197,7 @@ fn without_a_joint_state_nothing_is_admitted() {
     let other = Held { count: 1, ..held() };
     assert_eq!(judge(&header, &knots, Some(&other)).unwrap_err().reason, Reason::HeldJoint);
     let mut sunk = held();
-    sunk.positions[0] -= 0.011;
+    sunk.positions[0] -= 1.1 * Guard::HELD_TOLERANCE;
     assert_eq!(judge(&header, &knots, Some(&sunk)).unwrap_err().reason, Reason::HeldJoint);
 }
 

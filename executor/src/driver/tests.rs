@@ -26,7 +26,7 @@ fn at_home() -> JointStates {
 /// drift, or a move at rest does not.
 #[test]
 fn a_moving_torso_stops_the_arm() {
-    for (by, stops) in [(0.015, false), (TAU, false), (0.05, true), (f64::NAN, true)] {
+    for (by, stops) in [(0.0015, false), (TAU, false), (0.0025, true), (f64::NAN, true)] {
         let guard = pr2();
         let Slots { looping, mut worker, mut service } = Slots::default();
         let states = JointStates { held_count: 2, ..at_home() };

@@ -166,6 +166,22 @@ fn damaged_files_are_told_by_everybody_in_time() {
     }
 }
 
+/// Whoever typed `nullsweep` is told of commands of `nullsweep`, in errors and in help.
+#[test]
+fn behind_a_front_it_speaks_of_the_front() {
+    let root = TempDir::new().unwrap();
+    let here = root.path().to_str().unwrap();
+    for (front, own, run) in [
+        ("", "executor: no executor is running", "`executor run"),
+        ("nullsweep", "nullsweep: no executor is running", "`nullsweep run"),
+    ] {
+        let mut ctl = command(&["ctl", "--ipc-root", here, "status"], Stdio::piped());
+        let output = ctl.env(nullsweep_cell::FRONT, front).output().unwrap();
+        let text = said(&output);
+        assert!(text.contains(own) && text.contains(run), "{text}");
+    }
+}
+
 /// SIGTERM ends one that is still starting at once.
 #[test]
 fn one_that_starts_can_be_ended() {

@@ -16,6 +16,9 @@ use clap_complete::Shell;
                   executor, mock-hardware and the rest."
 )]
 pub(crate) struct Cli {
+    /// Take what is not given from this file; as well behind the command.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) cell: Option<PathBuf>,
     #[command(subcommand)]
     pub(crate) command: Command,
 }

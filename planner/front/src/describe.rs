@@ -6,11 +6,11 @@ use std::process::{Command, ExitCode, Stdio};
 use anyhow::{Context, ensure};
 use clap::CommandFactory;
 use clap_complete::Shell;
-use nullsweep_cell::{DESCRIBE, Described, VARIABLE};
+use nullsweep_cell::{DESCRIBE, Described, FRONT, VARIABLE};
 
 use crate::arguments::Cli;
 use crate::out::write_out;
-use crate::programs::{EXECUTOR, PLANNER, WHOLE, path};
+use crate::programs::{EXECUTOR, NAME, PLANNER, path, whole};
 
 /// Writes what a shell completes by to standard output.
 ///
@@ -18,7 +18,7 @@ use crate::programs::{EXECUTOR, PLANNER, WHOLE, path};
 /// Where a program tells nothing of itself.
 pub(crate) fn completions(shell: Shell) -> anyhow::Result<ExitCode> {
     let mut text = Vec::new();
-    clap_complete::generate(shell, &mut whole()?, "nullsweep", &mut text);
+    clap_complete::generate(shell, &mut all()?, NAME, &mut text);
     write_out(&text)
 }
 
@@ -29,12 +29,12 @@ pub(crate) fn completions(shell: Shell) -> anyhow::Result<ExitCode> {
 pub(crate) fn manuals(folder: &Path) -> anyhow::Result<ExitCode> {
     let there = || format!("cannot write {}", folder.display());
     std::fs::create_dir_all(folder).with_context(there)?;
-    clap_mangen::generate_to(whole()?, folder).with_context(there)?;
+    clap_mangen::generate_to(all()?, folder).with_context(there)?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// This program with all that the others take.
-fn whole() -> anyhow::Result<clap::Command> {
+fn all() -> anyhow::Result<clap::Command> {
     let mut command = Cli::command();
     for program in [PLANNER, EXECUTOR] {
         for below in ask(program)?.below() {
@@ -42,7 +42,7 @@ fn whole() -> anyhow::Result<clap::Command> {
             command = put(command, name, below);
         }
     }
-    for (program, name) in WHOLE {
+    for (program, name) in whole() {
         command = put(command, name.to_owned(), ask(program)?);
     }
     Ok(command)
@@ -65,6 +65,7 @@ fn ask(program: &str) -> anyhow::Result<Described> {
     let told = Command::new(&path)
         .arg(DESCRIBE)
         .env(VARIABLE, "")
+        .env(FRONT, NAME)
         .stdin(Stdio::null())
         .stderr(Stdio::null())
         .output()

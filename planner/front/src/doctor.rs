@@ -9,7 +9,7 @@ use std::time::Duration;
 use rustix::process::{Resource, getrlimit};
 
 use crate::out::write_out;
-use crate::programs::{EXECUTOR, PLANNER, WHOLE, path};
+use crate::programs::{EXECUTOR, PLANNER, path, whole};
 
 /// What was looked at.
 #[derive(Debug, PartialEq)]
@@ -194,7 +194,7 @@ fn leftovers(folder: &Path) -> Finding {
 /// The version of each program beside this one.
 fn versions() -> Finding {
     let own = env!("CARGO_PKG_VERSION");
-    let programs = [PLANNER, EXECUTOR].into_iter().chain(WHOLE.iter().map(|(name, _)| *name));
+    let programs = [PLANNER, EXECUTOR].into_iter().chain(whole().map(|(name, _)| name));
     let mut amiss = Vec::new();
     for program in programs {
         let told = Command::new(path(program)).arg("--version").stdin(Stdio::null()).output();

@@ -14,7 +14,12 @@ use programs::{EXECUTOR, PLANNER, start, start_endpoint};
 
 fn main() -> ExitCode {
     let cli: Cli = nullsweep_cell::parse_alone(std::env::args_os()).unwrap_or_else(|e| e.exit());
+    let cell = cli.cell.as_deref();
+    let start = |program, command, args| start(cell, program, command, args);
     let result = match cli.command {
+        Command::Doctor | Command::Completions { .. } | Command::Man { .. } if cell.is_some() => {
+            Err(anyhow::anyhow!("--cell is for commands that have to do with a robot"))
+        }
         Command::Doctor => doctor::run(),
         Command::Completions { shell } => describe::completions(shell),
         Command::Man { folder } => describe::manuals(&folder),
@@ -35,7 +40,7 @@ fn main() -> ExitCode {
         Command::Ctl(rest) => start(EXECUTOR, Some("ctl"), rest.args),
         Command::Top(rest) => start(EXECUTOR, Some("top"), rest.args),
         Command::Replay(rest) => start(EXECUTOR, Some("replay"), rest.args),
-        Command::Endpoint(rest) => start_endpoint(rest.args),
+        Command::Endpoint(rest) => start_endpoint(cell, rest.args),
         Command::Mock(rest) => start("mock-hardware", None, rest.args),
         Command::Demo(rest) => start("demo", None, rest.args),
         Command::Conformance(rest) => start("conformance", None, rest.args),

@@ -6,20 +6,18 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
-use nullsweep_cell::{Cell, FILE_NAME, VARIABLE};
+use nullsweep_cell::{Cell, FILE_NAME, FRONT, PROGRAMS, VARIABLE};
 
 pub(crate) const PLANNER: &str = "planner";
 pub(crate) const EXECUTOR: &str = "executor";
 
+/// What the others call this one.
+pub(crate) const NAME: &str = "nullsweep";
+
 /// The programs whose whole command line is one command of this one, and that command.
-pub(crate) const WHOLE: [(&str, &str); 6] = [
-    ("mock-hardware", "mock"),
-    ("demo", "demo"),
-    ("conformance", "conformance"),
-    ("latency", "latency"),
-    ("kills", "kills"),
-    ("soak", "soak"),
-];
+pub(crate) fn whole() -> impl Iterator<Item = (&'static str, &'static str)> {
+    PROGRAMS.into_iter().filter(|(_, command)| !command.is_empty())
+}
 
 /// A program beside this one; else its name, to be found on the PATH.
 pub(crate) fn path(program: &str) -> PathBuf {
@@ -27,19 +25,24 @@ pub(crate) fn path(program: &str) -> PathBuf {
     beside.filter(|path| path.is_file()).unwrap_or_else(|| program.into())
 }
 
-/// Becomes a program, whose help speaks of it as a command of this one.
+/// Becomes a program, which speaks of it as a command of this one. `cell` is the file that was named
+/// before the command.
 ///
 /// # Errors
 /// Where it cannot be started; else this does not return.
 pub(crate) fn start(
+    cell: Option<&Path>,
     program: &str,
     command: Option<&str>,
     args: Vec<OsString>,
 ) -> anyhow::Result<ExitCode> {
-    let whole = WHOLE.iter().find(|(name, _)| *name == program);
-    let shown = whole.map_or("nullsweep".into(), |(_, command)| format!("nullsweep {command}"));
+    let shown = whole()
+        .find(|(name, _)| *name == program)
+        .map_or(NAME.into(), |(_, command)| format!("{NAME} {command}"));
     let path = path(program);
-    let error = Command::new(&path).arg0(shown).args(command).args(args).exec();
+    let mut started = Command::new(&path);
+    started.arg0(shown).env(FRONT, NAME).args(named(cell)).args(command).args(args);
+    let error = started.exec();
     Err(error).with_context(|| {
         format!(
             "cannot start {}: `cargo install --path FOLDER` installs it, for each of the folders \
@@ -49,11 +52,20 @@ pub(crate) fn start(
     })
 }
 
+/// What names a cell file on a command line.
+fn named(cell: Option<&Path>) -> impl Iterator<Item = OsString> {
+    cell.into_iter().flat_map(|file| ["--cell".into(), file.into()])
+}
+
 /// Becomes the endpoint that the cell file names, in the folder of that file, from which its paths are.
 ///
 /// # Errors
 /// No cell file, none in it, or it cannot be started.
-pub(crate) fn start_endpoint(mut args: Vec<OsString>) -> anyhow::Result<ExitCode> {
+pub(crate) fn start_endpoint(
+    cell: Option<&Path>,
+    mut args: Vec<OsString>,
+) -> anyhow::Result<ExitCode> {
+    args.extend(named(cell));
     let Some(file) = nullsweep_cell::take(&mut args) else {
         bail!("no {FILE_NAME} here or above: `nullsweep cell init` writes one");
     };
@@ -67,8 +79,9 @@ pub(crate) fn start_endpoint(mut args: Vec<OsString>) -> anyhow::Result<ExitCode
     };
     // A name is looked for beside this program and on the PATH, a path is from the cell's folder on.
     let program = if program.contains('/') { folder.join(program) } else { path(&program) };
-    let error =
-        Command::new(&program).args(own).args(args).current_dir(folder).env(VARIABLE, &file).exec();
+    let mut started = Command::new(&program);
+    started.args(own).args(args).current_dir(folder).env(VARIABLE, &file).env(FRONT, NAME);
+    let error = started.exec();
     let program = program.display();
     Err(error)
         .with_context(|| format!("cannot start {program}, the endpoint of {}", file.display()))

@@ -28,7 +28,7 @@ static PROGRAMS: LazyLock<PathBuf> = LazyLock::new(|| {
         let told = Described::of(&command).to_json();
         let text = format!(
             "#!/bin/sh\nif [ \"$1\" = __describe ]; then echo '{told}'; exit; fi\n\
-             if [ \"$1\" = --version ]; then echo {name} 0.0.1; exit; fi\necho {name}: \"$@\"\nexit 7\n"
+             if [ \"$1\" = --version ]; then echo {name} 0.0.1; exit; fi\necho {name}: \"$@\"\n[ \"$NULLSWEEP_FRONT\" = nullsweep ] && exit 7\n"
         );
         let path = folder.join(name);
         fs::write(&path, text).expect("written");
@@ -71,6 +71,17 @@ fn commands_go_to_their_programs_as_they_stand() {
         let (code, told) = front(folder.path(), args);
         assert_eq!((code, told.trim_end()), (Some(7), said));
     }
+    // The cell before the command is as good as behind it.
+    for (args, said) in [
+        (&["--cell", "own.toml", "plan", "a.ply"][..], "planner: --cell own.toml plan a.ply"),
+        (&["--cell=own.toml", "mock", "--wrap"], "mock-hardware: --cell own.toml --wrap"),
+    ] {
+        let (code, told) = front(folder.path(), args);
+        assert_eq!((code, told.trim_end()), (Some(7), said));
+    }
+    let (code, told) = front(folder.path(), &["--cell", "own.toml", "doctor"]);
+    assert_eq!(code, Some(1), "{told}");
+    assert!(told.contains("--cell"), "{told}");
     let (code, told) = front(folder.path(), &["paln"]);
     assert_eq!(code, Some(2), "{told}");
     assert!(told.contains("plan"), "{told}");
@@ -93,8 +104,12 @@ fn the_endpoint_is_the_cells() {
     let script = "#!/bin/sh\necho \"$(basename $PWD) $(basename $NULLSWEEP_CELL): $@\"\n";
     fs::write(other.join("arm"), script).expect("written");
     fs::set_permissions(other.join("arm"), fs::Permissions::from_mode(0o755)).expect("a script");
-    for cell in [&["--cell=other/own.toml"][..], &["--cell", "other/own.toml"]] {
-        let (code, told) = front(folder.path(), &[&["endpoint"], cell, &["-x"]].concat());
+    for args in [
+        &["endpoint", "--cell=other/own.toml", "-x"][..],
+        &["endpoint", "--cell", "other/own.toml", "-x"],
+        &["--cell", "other/own.toml", "endpoint", "-x"],
+    ] {
+        let (code, told) = front(folder.path(), args);
         assert_eq!((code, told.trim_end()), (Some(0), "other own.toml: a.urdf -x"));
     }
 }

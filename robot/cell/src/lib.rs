@@ -8,10 +8,12 @@ mod causes;
 mod defaults;
 mod describe;
 mod file;
+mod front;
 mod parse;
 
 pub use causes::causes;
 pub use defaults::{Defaults, FLAGS};
 pub use describe::{DESCRIBE, Described};
 pub use file::{Cell, CellError, FILE_NAME};
+pub use front::{FRONT, PROGRAMS, as_called};
 pub use parse::{VARIABLE, parse, parse_alone, take};

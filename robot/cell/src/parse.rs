@@ -5,6 +5,7 @@ use std::io::Write;
 use std::ops::Range;
 use std::path::PathBuf;
 
+use clap::builder::StyledStr;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, Error, Parser};
@@ -13,6 +14,7 @@ use crate::causes::causes;
 use crate::defaults::Defaults;
 use crate::describe::{DESCRIBE, Described};
 use crate::file::{Cell, FILE_NAME};
+use crate::front::as_called;
 
 /// Names the cell file where `--cell` does not; empty: there is none.
 pub const VARIABLE: &str = "NULLSWEEP_CELL";
@@ -33,7 +35,7 @@ pub fn parse<P: Parser>(
     urgent: &[&str],
 ) -> Result<P, Error> {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
-    let command = P::command().max_term_width(WIDTH).arg(cell_argument());
+    let command = in_its_words(P::command()).max_term_width(WIDTH).arg(cell_argument());
     describe(&args, &command);
     let given = given(&args).map(|(_, path)| path).or_else(variable);
     let is_given = given.is_some();
@@ -95,9 +97,33 @@ pub fn parse_alone<P: Parser>(
     args: impl IntoIterator<Item = impl Into<OsString>>,
 ) -> Result<P, Error> {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
-    let command = P::command().max_term_width(WIDTH);
+    let command = in_its_words(P::command()).max_term_width(WIDTH);
     describe(&args, &command);
     P::from_arg_matches_mut(&mut command.try_get_matches_from(args)?)
+}
+
+/// A command whose help speaks of the programs as its reader calls them.
+fn in_its_words(mut command: Command) -> Command {
+    let said = |text: Option<&StyledStr>| text.map(|text| as_called(text.to_string()));
+    if let Some(about) = said(command.get_about()) {
+        command = command.about(about);
+    }
+    if let Some(about) = said(command.get_long_about()) {
+        command = command.long_about(about);
+    }
+    if let Some(help) = said(command.get_after_help()) {
+        command = command.after_help(help);
+    }
+    let in_words = |mut arg: Arg| {
+        if let Some(help) = said(arg.get_help()) {
+            arg = arg.help(help);
+        }
+        if let Some(help) = said(arg.get_long_help()) {
+            arg = arg.long_help(help);
+        }
+        arg
+    };
+    command.mut_args(in_words).mut_subcommands(in_its_words)
 }
 
 /// Where it is asked for, writes the description and ends the process.

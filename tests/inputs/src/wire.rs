@@ -86,7 +86,7 @@ fn next_plan(rest: &mut &[u8], guard: &Guard) -> Option<Option<Arc<ValidPlan>>> 
         guard: *guard,
         fingerprint: arm().1.fingerprint(),
         held_continuous: Vec::new(),
-        held_tolerance: Rules::HELD_TOLERANCE,
+        held_tolerance: Guard::HELD_TOLERANCE,
         since_ns: START,
     };
     let held = Held { positions: [0.0; MAX_HELD_JOINTS], count: 0 };
