@@ -38,7 +38,15 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    // The priority in a cell is the executor's.
+    let cli: Cli = match nullsweep_cell::parse(
+        std::env::args_os(),
+        &[("run", &["priority"])],
+        &["reset", "halt"],
+    ) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
     // The executor's: no setpoint waits for whoever reads it.
     let log = Log::install("pr2_bridge=info,nullsweep_bridge=info,warn");
     let result = match &cli.command {

@@ -1,5 +1,5 @@
 //! How one program plays every part: with a hidden first argument it becomes the planner, the
-//! executor or the mock, each with that program's own command line; else it is itself, by its own.
+//! executor, the mock or the front, each with that program's own command line; else it is itself, by its own.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -37,5 +37,6 @@ pub fn play(args: &[OsString]) -> Option<ExitCode> {
         Part::Executor => nullsweep_executor::main_with(own),
         Part::Mock => mock::main(own),
         Part::Sketch => publisher::main(own),
+        Part::Front => nullsweep::main(own),
     })
 }

@@ -31,11 +31,14 @@ pub enum Part {
     Mock,
     /// Publishes a sketch, see [`crate::publisher`].
     Sketch,
+    /// `nullsweep`, which starts the programs beside it.
+    Front,
 }
 
 impl Part {
     /// Every part.
-    pub const ALL: [Self; 4] = [Self::Planner, Self::Executor, Self::Mock, Self::Sketch];
+    pub const ALL: [Self; 5] =
+        [Self::Planner, Self::Executor, Self::Mock, Self::Sketch, Self::Front];
 
     /// The hidden first argument.
     #[must_use]
@@ -45,6 +48,7 @@ impl Part {
             Self::Executor => "__executor",
             Self::Mock => "__mock",
             Self::Sketch => "__sketch",
+            Self::Front => "__front",
         }
     }
 

@@ -37,6 +37,12 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         publish(error)
     } else if let Some(ReplanError::Publish(error)) = error.downcast_ref() {
         publish(error)
+    } else if let Some(ReplanError::Ends { .. }) = error.downcast_ref() {
+        Some(
+            "a shorter --lead takes over sooner, and has the arm stopped where planning takes longer; or \
+             let the plan end and make another one"
+                .into(),
+        )
     } else if let Some(error) = error.downcast_ref() {
         collision(error)
     } else if let Some(error) = error.downcast_ref() {
@@ -152,9 +158,19 @@ fn publish(error: &PublishError) -> Option<String> {
             "make the plan with `planner plan --continue PLAN@K`, or publish it with --join stop"
         }
         PublishError::NothingRuns => "`planner publish --join stop` sends a plan to an idle arm",
+        PublishError::EndedEarly(event) if event.reason == Reason::HeldJoint.wire() => {
+            "keep torso and other arm still while the arm moves"
+        }
+        PublishError::Rejected(event) if event.reason == Reason::HeldJoint.wire() => {
+            "move it there, or plan for where it stands: `held` in the cell, --held, --torso"
+        }
         PublishError::Lost(_) => {
             "see the executor's last lines for why; it starts no plan from before its own start, so \
              publish again, or `planner replan`, once `executor ctl status` answers"
+        }
+        PublishError::Rejected(event) if event.reason == Reason::Start.wire() => {
+            "only a plan of `planner replan`, or of `planner plan --continue PLAN@K`, takes over in \
+             motion; any other one once the arm rests at its start: `planner goto --plan PLAN`"
         }
         PublishError::Rejected(event) if event.reason == Reason::NotReady.wire() => {
             "is the endpoint running? `executor ctl status` tells more"
@@ -246,7 +262,9 @@ mod tests {
             PublishError::Rejected(Box::new(event))
         };
         assert!(of(event(Reason::NotReady)).contains("endpoint"));
-        assert_eq!(advice(&event(Reason::Start).into()), None);
+        assert!(of(event(Reason::Start)).contains("`planner replan`"));
+        assert!(of(event(Reason::HeldJoint)).contains("--held"));
+        assert_eq!(advice(&event(Reason::Velocity).into()), None);
     }
 
     #[test]

@@ -5,6 +5,8 @@ use std::sync::Mutex;
 use indicatif::{ProgressBar, ProgressStyle};
 use nullsweep_planner::progress::Progress;
 
+use crate::output::complain;
+
 /// Shows each stage's progress on standard error, if that is a terminal.
 pub(super) struct Bars {
     bar: Mutex<ProgressBar>,
@@ -57,6 +59,6 @@ impl Progress for Bars {
             }
             told.push(text.to_owned());
         }
-        self.with(|bar| bar.suspend(|| eprintln!("note: {text}")));
+        self.with(|bar| bar.suspend(|| complain!("note: {text}")));
     }
 }

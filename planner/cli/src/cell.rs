@@ -276,7 +276,8 @@ impl CheckArgs {
         );
         let _ = writeln!(
             text,
-            "\n# How fast: one velocity for all joints, and whether accelerations are limited.\n\
+            "\n# How fast: one velocity for all joints, and whether accelerations or jerks are limited\n\
+             # (velocity, acceleration, jerk).\n\
              [limits]\n# v_max = 0.5\nprofile = \"acceleration\"\n\n\
              # How scans stand, and where the robot stands before them.\n\
              [scene]\n# up = [0, -1, 0]\n# sensor_height = 0.83\n# support_height = 0.72\n\

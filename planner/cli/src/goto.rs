@@ -12,7 +12,7 @@ use nullsweep_robot::{JointVector, Tool};
 use crate::bars::Bars;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::numbers::{Held, Place};
-use crate::output::{say, say_on, writable};
+use crate::output::{complain, say, say_on, writable};
 use crate::posture::is_known;
 use crate::posture_arg::PostureArg;
 use crate::robot::{RobotArgs, tool_file};
@@ -75,7 +75,7 @@ pub(super) fn run(args: &GotoArgs) -> anyhow::Result<u8> {
     };
     let found = match args.way.find(&way, to, &bars) {
         Err(error) if error.is::<Broken>() => {
-            eprintln!("planner: {error}");
+            complain!("planner: {error}");
             return Ok(VIOLATIONS);
         }
         found => found?,

@@ -87,7 +87,7 @@ fn paced(args: &InspectArgs, plan: &Plan) -> anyhow::Result<Option<(Pace, Passes
     }
     let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
     let arm = arm.with_held(&held)?;
-    let pace = Pace::of(plan.trajectory(), &arm, args.dip);
+    let pace = Pace::of(plan.trajectory(), plan.begins_in_motion(), &arm, args.dip);
     Ok(Some((pace, passes(&plan.scan(), plan.trajectory(), &arm))))
 }
 

@@ -50,6 +50,8 @@ use std::sync::atomic::AtomicBool;
 use clap::{Parser, Subcommand};
 use signal_hook::consts::SIGPIPE;
 
+use output::complain;
+
 /// Plans how a redundant arm sweeps a scanned surface, and publishes the plan.
 #[derive(Debug, Parser)]
 #[command(
@@ -134,9 +136,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     match result {
         Ok(code) => ExitCode::from(code),
         Err(e) => {
-            eprintln!("planner: {}", nullsweep_cell::causes(e.as_ref()));
+            complain!("planner: {}", nullsweep_cell::causes(e.as_ref()));
             if let Some(advice) = advice::advice(&e) {
-                eprintln!("help: {advice}");
+                complain!("help: {advice}");
             }
             ExitCode::from(exit::of(&e))
         }

@@ -30,7 +30,8 @@ pub(super) fn writable(path: &Path) -> anyhow::Result<()> {
 /// # Errors
 /// Where it takes no more, as a full disk does.
 pub(super) fn write_out(words: Arguments<'_>) -> anyhow::Result<()> {
-    std::io::stdout().lock().write_fmt(words).context("cannot write to standard output")
+    let words = nullsweep_cell::as_called(words.to_string());
+    std::io::stdout().lock().write_all(words.as_bytes()).context("cannot write to standard output")
 }
 
 /// Says a line on standard output; a command fails that cannot.
@@ -55,7 +56,14 @@ macro_rules! tell {
     }};
 }
 
-pub(super) use {say, say_on, tell};
+/// Says a line on standard error, in which programs are called as whoever reads it calls them.
+macro_rules! complain {
+    ($($words:tt)*) => {
+        eprintln!("{}", nullsweep_cell::as_called(format!($($words)*)))
+    };
+}
+
+pub(super) use {complain, say, say_on, tell};
 
 #[cfg(test)]
 mod tests {

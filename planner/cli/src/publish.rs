@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Arg, Args, Command};
 use nullsweep_planner::link::publish::Join;
 use nullsweep_planner::plan::Plan;
 use nullsweep_robot::Arm;
@@ -10,13 +10,14 @@ use nullsweep_robot::Arm;
 use crate::bars::Bars;
 use crate::choices::JoinArg;
 use crate::exit::{OK, Usage, VIOLATIONS};
-use crate::output::{say, say_on};
+use crate::output::{complain, say, say_on};
 use crate::robot::RobotArgs;
-use crate::send::{SendArgs, outlook, resting};
+use crate::send::{SendArgs, interruption, outlook, resting};
 use crate::site::SiteArgs;
 use crate::way::{Broken, Found, Way, WayArgs};
 
 #[derive(Debug, Args)]
+#[command(mut_args(only_with_goto))]
 pub(super) struct PublishArgs {
     /// The plan file.
     plan: PathBuf,
@@ -49,14 +50,15 @@ pub(super) struct PublishArgs {
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     let plan = Plan::read(&args.plan)?;
     match plan.check_seal() {
-        Err(error) if args.unverified => eprintln!("planner: warning: {error}; it is sent anyway"),
+        Err(error) if args.unverified => complain!("planner: warning: {error}; it is sent anyway"),
         checked => checked?,
     }
     let natural = if plan.continues.is_some() { Join::Knot } else { Join::Stop };
     let join = args.join.map_or(natural, Join::from);
     if args.goto && join != Join::Stop {
         return Err(Usage(
-            "with --goto the arm comes to rest at the plan's start, and a plan that goes on from a              knot of another one, or after it, joins it in motion: leave out --goto, or give --join \
+            "with --goto the arm comes to rest at the plan's start, and a plan that goes on from a \
+             knot of another one, or after it, joins it in motion: leave out --goto, or give --join \
              stop to run it alone"
                 .into(),
         )
@@ -66,7 +68,7 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     let arm = args.arm_of(&plan);
     let first = match args.way_to(&plan) {
         Err(error) if error.is::<Broken>() => {
-            eprintln!("planner: {error}");
+            complain!("planner: {error}");
             return Ok(VIOLATIONS);
         }
         first => first?,
@@ -79,12 +81,22 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     say!("{}:", args.plan.display());
     let now = now.filter(|_| first.is_none());
     say_on!("{}", outlook(&plan, arm.as_ref(), now.as_ref()));
+    if let (Some(arm), None, true) = (&arm, &now, first.is_none() && join == Join::Stop) {
+        say_on!("{}", interruption(site, arm));
+    }
     args.send.confirm()?;
     if let Some(first) = &first {
         args.send.send((&first.plan, None), arm.as_ref(), site, Join::Stop, true)?;
     }
     args.send.send((&plan, Some(&args.plan)), arm.as_ref(), site, join, args.wait)?;
     Ok(OK)
+}
+
+/// What says how the way to the start is planned says nothing without one.
+fn only_with_goto(arg: Arg) -> Arg {
+    let way = WayArgs::augment_args(Command::new("way"));
+    let is_ways = way.get_arguments().any(|of_way| of_way.get_id() == arg.get_id());
+    if is_ways { arg.requires("goto") } else { arg }
 }
 
 impl PublishArgs {

@@ -6,6 +6,7 @@ use nullsweep_planner::plan::Plan;
 use nullsweep_planner::verify::Violation;
 
 use crate::exit::{OK, VIOLATIONS};
+use crate::output::complain;
 
 /// Most violations that are told one by one.
 const TOLD: usize = 10;
@@ -21,7 +22,7 @@ pub(super) fn write_unless_broken(
         return Ok(OK);
     }
     tell(violations);
-    eprintln!("planner: the plan breaks {} rules and was not written", violations.len());
+    complain!("planner: the plan breaks {} rules and was not written", violations.len());
     Ok(VIOLATIONS)
 }
 

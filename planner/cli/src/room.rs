@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use nalgebra::{Point3, Translation3, Vector3};
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
@@ -68,12 +68,9 @@ pub(super) fn object(
     let scan = &placed.scan;
     let room = Room::find(scan, placed.seed.unwrap_or(SEED));
     let count = room.segments.len();
-    ensure!(
-        count > 0,
-        "no object stands on the {} planes of the scene: look with `planner scene`, or cut out with \
-         --crop what is to be swept",
-        room.planes.len()
-    );
+    if let Some(why) = without_objects(&room) {
+        bail!("{why}");
+    }
     let index = chosen(scan, &room, choice)?;
     let segment = &room.segments[index];
     let (low, high) = (segment.bounds.min, segment.bounds.max);
@@ -90,6 +87,24 @@ pub(super) fn object(
     scene.surroundings.retain(|point| !room.is_on_plane(point));
     scene.obstacles.extend(room.planes.iter().filter_map(obstacle));
     Ok((scene, flying))
+}
+
+/// What to say of a scene in which nothing stands on a plane.
+pub(super) fn without_objects(room: &Room) -> Option<String> {
+    let found = match room.planes.len() {
+        _ if !room.segments.is_empty() => return None,
+        0 => {
+            "no plane was found that an object could stand on, as in a scan that shows the object \
+              alone"
+                .into()
+        }
+        1 => "no object stands on the one plane of the scene".into(),
+        count => format!("no object stands on the {count} planes of the scene"),
+    };
+    Some(format!(
+        "{found}: leave out --object, which sweeps all that was scanned, or cut out with --crop what is \
+         to be swept"
+    ))
 }
 
 /// The index of the object that is chosen.

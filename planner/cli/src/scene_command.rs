@@ -13,7 +13,7 @@ use crate::bars::Bars;
 use crate::exit::OK;
 use crate::output::{say, writable};
 use crate::placed::{Gravity, PlacedArgs, read_scans};
-use crate::room::{SEED, name};
+use crate::room::{SEED, name, without_objects};
 use crate::scene_file::SceneFile;
 use crate::sheet::sheet;
 
@@ -52,7 +52,11 @@ pub(super) fn run(args: &SceneCommandArgs) -> anyhow::Result<u8> {
     bars.clear();
     let mut table = sheet(COLUMNS);
     table.add_rows(rows(&room));
-    say!("{table}");
+    match without_objects(&room) {
+        Some(why) if room.planes.is_empty() => say!("{why}"),
+        Some(why) => say!("{table}\n{why}"),
+        None => say!("{table}"),
+    }
     if let Some(path) = &args.out {
         SceneFile::of(path, &found, &room, seed)?.write(path)?;
         say!("scene: {}", path.display());

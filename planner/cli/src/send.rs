@@ -10,11 +10,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use nullsweep_collision::Margins;
 use nullsweep_ipc_types::{Mode, PlanEvent, Reason, Telemetry};
 use nullsweep_planner::link::Site;
-use nullsweep_planner::link::posture::{Posture, posture, unit};
+use nullsweep_planner::link::posture::{Posture, PostureError, posture, unit};
 use nullsweep_planner::link::publish::{
     Join, Patience, PublishError, Watcher, describe_for, publish,
 };
-use nullsweep_planner::plan::{Plan, Stretch};
+use nullsweep_planner::plan::{Held, Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::Arm;
 
@@ -58,6 +58,18 @@ pub(super) struct NotSent;
 /// Where the arm is, if it rests.
 pub(super) fn resting(site: Site<'_>, arm: &Arm) -> Option<Posture> {
     posture(site, arm, LOOK).ok()
+}
+
+/// What becomes of a plan that runs when another one is to begin at rest, as a line of an outlook; empty
+/// where none runs.
+pub(super) fn interruption(site: Site<'_>, arm: &Arm) -> &'static str {
+    match posture(site, arm, LOOK) {
+        Err(PostureError::NotHeld(Mode::Executing | Mode::Paused | Mode::Stopping)) => {
+            "  joins     after a stop of the plan that runs, and only if that stop ends where this one \
+             starts;\n            plans of replan, or of plan --continue PLAN@K, take over in motion\n"
+        }
+        _ => "",
+    }
 }
 
 /// How far each joint is from a plan's start, by name, where it is by more than `bound`.
@@ -177,6 +189,7 @@ struct Show {
     bar: ProgressBar,
     duration: f64,
     joints: Vec<String>,
+    held: Vec<Held>,
 }
 
 impl Show {
@@ -185,13 +198,14 @@ impl Show {
         if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
-        Self { bar, duration: plan.duration(), joints: plan.joints.clone() }
+        let (joints, held) = (plan.joints.clone(), plan.held.clone());
+        Self { bar, duration: plan.duration(), joints, held }
     }
 }
 
 impl Watcher for Show {
     fn event(&mut self, event: &PlanEvent) {
-        self.bar.suspend(|| tell!("{}", describe_for(event, &self.joints)));
+        self.bar.suspend(|| tell!("{}", describe_for(event, &self.joints, &self.held)));
     }
 
     fn progress(&mut self, telemetry: &Telemetry) {

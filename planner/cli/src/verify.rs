@@ -13,7 +13,7 @@ use crate::bars::Bars;
 use crate::exit::{OK, VIOLATIONS};
 use crate::figures::verified_rows;
 use crate::json::write_json;
-use crate::output::{say, writable};
+use crate::output::{complain, say, writable};
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
 use crate::scene::{Demo, SceneArgs, scene};
@@ -85,7 +85,7 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     }
     if !found.violations.is_empty() {
         tell(&found.violations);
-        eprintln!("planner: the plan breaks {} rules", found.violations.len());
+        complain!("planner: the plan breaks {} rules", found.violations.len());
         return Ok(VIOLATIONS);
     }
     if let Some(out) = &args.out {

@@ -44,7 +44,7 @@ pub(super) struct ViewArgs {
     /// Seed of the simulated scan, or of the points laid on a mesh; without it the plan's, or 1.
     #[arg(long)]
     seed: Option<u64>,
-    /// Where the page is written; without it beside the first file, its name with `.html` behind.
+    /// Where the page is written; without it beside the first file, its name with `.view.html` behind.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write the same as an MCAP log as well, for Foxglove, rerun and whatever reads ROS 2 messages.
@@ -201,7 +201,7 @@ fn has_extension(file: &Path, wanted: &str) -> bool {
 }
 
 fn beside(file: Option<&PathBuf>) -> PathBuf {
-    file.map_or_else(|| "view.html".into(), |file| file.with_extension("html"))
+    file.map_or_else(|| "view.html".into(), |file| file.with_extension("view.html"))
 }
 
 /// Opens the page in the user's browser, or says why not.

@@ -7,7 +7,7 @@ use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError};
 use nullsweep_ipc_types::{EventKind, JoinRule, PlanEvent, PlanId, Reason, Telemetry};
 
 use crate::link::pulse::{Lost, Pulse};
-use crate::plan::{Plan, PlanError};
+use crate::plan::{Held, Plan, PlanError};
 
 /// How a plan joins what is going on, as it is asked for on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -182,12 +182,12 @@ pub fn newest_telemetry(ipc: &Ipc, patience: Duration) -> Result<Telemetry, Publ
 /// An event in words, with the joint, knot, value and bound that it names.
 #[must_use]
 pub fn describe(event: &PlanEvent) -> String {
-    describe_for(event, &[])
+    describe_for(event, &[], &[])
 }
 
-/// The same, its joint by its name among the plan's.
+/// The same, its joint by its name among those that the plan moves, or holds where it is one of these.
 #[must_use]
-pub fn describe_for(event: &PlanEvent, joints: &[String]) -> String {
+pub fn describe_for(event: &PlanEvent, joints: &[String], held: &[Held]) -> String {
     let kind = EventKind::from_wire(event.kind).map_or("unknown event", EventKind::text);
     let mut text = format!("plan {} {kind}", event.plan);
     if let Some(reason) = Reason::from_wire(event.reason).filter(|r| *r != Reason::None) {
@@ -196,11 +196,15 @@ pub fn describe_for(event: &PlanEvent, joints: &[String]) -> String {
     if event.knot != u32::MAX {
         text += &format!(", knot {}", event.knot);
     }
+    let of_held = event.reason == Reason::HeldJoint.wire();
     if event.joint != u32::MAX {
-        match joints.get(event.joint as usize) {
-            Some(name) => text += &format!(", {name}"),
-            None => text += &format!(", joint {}", event.joint),
-        }
+        let at = event.joint as usize;
+        let name = if of_held { held.get(at).map(|h| &h.name) } else { joints.get(at) };
+        text += &match name {
+            Some(name) => format!(", {name}"),
+            None if of_held => format!(", held joint {at}"),
+            None => format!(", joint {at}"),
+        };
     }
     if event.kind == EventKind::Accepted.wire() {
         if event.value.is_finite() {
@@ -208,11 +212,39 @@ pub fn describe_for(event: &PlanEvent, joints: &[String]) -> String {
         }
         return text;
     }
+    let (value, bound) = if of_held { ("planned for", "measured at") } else { ("value", "bound") };
     if event.value.is_finite() {
-        text += &format!(", value {:.6}", event.value);
+        text += &format!(", {value} {:.6}", event.value);
     }
     if event.bound.is_finite() {
-        text += &format!(", bound {:.6}", event.bound);
+        text += &format!(", {bound} {:.6}", event.bound);
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use super::*;
+
+    #[test]
+    fn a_held_joint_is_named_and_no_joint_of_the_arm() {
+        let joints = ["shoulder".to_owned(), "elbow".to_owned()];
+        let held = ["torso", "head"].map(|name| Held { name: name.into(), position: 0.2 });
+        let event = |reason: Reason| PlanEvent {
+            kind: EventKind::Rejected.wire(),
+            reason: reason.wire(),
+            knot: u32::MAX,
+            joint: 0,
+            value: 0.2,
+            bound: 0.1,
+            ..PlanEvent::zeroed()
+        };
+        let text = describe_for(&event(Reason::HeldJoint), &joints, &held);
+        assert!(text.ends_with(", torso, planned for 0.200000, measured at 0.100000"), "{text}");
+        assert!(describe(&event(Reason::HeldJoint)).contains(", held joint 0, planned for"));
+        let text = describe_for(&event(Reason::Velocity), &joints, &held);
+        assert!(text.ends_with(", shoulder, value 0.200000, bound 0.100000"), "{text}");
+    }
 }

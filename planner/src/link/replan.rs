@@ -86,6 +86,17 @@ pub enum ReplanError {
         /// Greatest position of the joint there.
         high: f64,
     },
+    /// It ends before a new one could take over.
+    #[error(
+        "the running plan ends in {left:.1} s, before a new one that takes {lead:.1} s to make could \
+         take over"
+    )]
+    Ends {
+        /// Until its end at full speed. \[s\]
+        left: f64,
+        /// How long a new plan may take. \[s\]
+        lead: f64,
+    },
     /// The arm cannot be stopped to go on from there.
     #[error("the executor does not stop the arm: {}", .0.text())]
     NotStopped(Verdict),
@@ -118,7 +129,7 @@ pub fn replan(
     }
     runs(running, &telemetry.commanded, telemetry.knot)?;
     let old = telemetry.plan;
-    let knot = knot_ahead(running, telemetry.plan_time_ns, lead);
+    let knot = knot_ahead(running, telemetry.plan_time_ns, lead)?;
     let plan = make(Start::Knot(knot)).map_err(ReplanError::Make)?;
     // Whoever published another plan meanwhile wants that one.
     let still = newest_telemetry(&ipc, patience.admission)?;
@@ -155,11 +166,16 @@ fn runs(plan: &Plan, at: &JointArray, knot: u32) -> Result<(), ReplanError> {
     Ok(())
 }
 
-/// The first knot that is not reached within `lead` at full speed; the last one if none is.
-fn knot_ahead(plan: &Plan, time_ns: u64, lead: Duration) -> usize {
+/// The first knot that is not reached within `lead` at full speed, before the last one: there nothing
+/// would be left to replace.
+fn knot_ahead(plan: &Plan, time_ns: u64, lead: Duration) -> Result<usize, ReplanError> {
     let due = time_ns.saturating_add(u64::try_from(lead.as_nanos()).unwrap_or(u64::MAX));
     let ahead = plan.knots.partition_point(|k| k.time_ns <= due);
-    ahead.min(plan.knots.len().saturating_sub(1))
+    if ahead + 1 < plan.knots.len() {
+        return Ok(ahead);
+    }
+    let left = plan.duration() - time_ns as f64 * 1e-9;
+    Err(ReplanError::Ends { left: left.max(0.0), lead: lead.as_secs_f64() })
 }
 
 /// Whether a later start may be taken although this one was not.
@@ -266,10 +282,14 @@ mod tests {
         let ahead = |time_s: f64, lead_s: f64| {
             knot_ahead(&plan, (time_s * 1e9) as u64, Duration::from_secs_f64(lead_s))
         };
-        assert_eq!(ahead(0.0, 0.0), 1);
-        assert_eq!(ahead(2.5, 3.0), 6);
-        assert_eq!(ahead(2.5, 2.5), 6, "a knot that is due at once is too near");
-        assert_eq!(ahead(2.5, 100.0), 9, "the last one is better than none");
+        let found = |time_s: f64, lead_s: f64| ahead(time_s, lead_s).expect("a knot");
+        assert_eq!(found(0.0, 0.0), 1);
+        assert_eq!(found(2.5, 3.0), 6);
+        assert_eq!(found(2.5, 2.5), 6, "a knot that is due at once is too near");
+        for (time_s, lead_s) in [(2.5, 100.0), (0.0, 8.5), (8.5, 0.0)] {
+            let error = ahead(time_s, lead_s).expect_err("it ends before").to_string();
+            assert!(error.contains(&format!("ends in {:.1} s", 9.0 - time_s)), "{error}");
+        }
     }
 
     #[test]

@@ -87,7 +87,7 @@ pub(super) fn figures(plan: &Plan, arm: &Arm, graph: &Graph, sequence: &Sequence
         transfer_m: pad_path(plan, arm, false),
         knots: plan.knots.len(),
         jumps: sequence.jumps(),
-        pace: Pace::of(plan.trajectory(), arm, DIP),
+        pace: Pace::of(plan.trajectory(), plan.begins_in_motion(), arm, DIP),
         dropped_patches: sequence.dropped.len(),
         ..Figures::default()
     }

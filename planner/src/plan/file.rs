@@ -126,6 +126,16 @@ pub struct Continues {
 }
 
 impl Plan {
+    /// Whether it takes over from another plan in passing: what the joints did before is then that
+    /// one's, else the arm was at rest.
+    #[must_use]
+    pub fn begins_in_motion(&self) -> bool {
+        let first = self.knots.first();
+        self.continues.is_some()
+            && (self.profile == Profile::Velocity
+                || first.is_some_and(|k| k.v != JointVector::ZERO))
+    }
+
     /// A bang-bang plan through these knots, base and root frame in one place, of no patch and no
     /// scan: what else it is made for is filled in by who makes it.
     #[must_use]

@@ -53,9 +53,11 @@ pub struct JointPace {
 }
 
 impl Pace {
-    /// Of a plan's motion, with a tool speed below which it dips. \[m/s\]
+    /// Of a plan's motion, with a tool speed below which it dips. \[m/s\] `moving`: it takes over from
+    /// another plan in motion, so that what the joints did before is not known here; else they were
+    /// at rest.
     #[must_use]
-    pub fn of(path: Trajectory<'_>, arm: &Arm, dip_speed: f64) -> Self {
+    pub fn of(path: Trajectory<'_>, moving: bool, arm: &Arm, dip_speed: f64) -> Self {
         let pad = path.tool.on(arm);
         let mut speeds = Vec::new();
         let mut dips = Dips { speed: dip_speed, ..Dips::default() };
@@ -64,21 +66,26 @@ impl Pace {
         let mut cursor = TrajectoryCursor::new(path);
         let end_ns = path.knots.last().map_or(0, |k| k.time_ns);
         let mut before: Option<(JointVector, Option<Point3<f64>>)> = None;
-        // Differences of the last sample and the one before.
-        let mut rates: [JointVector; 2] = [JointVector::ZERO; 2];
+        // Velocity and acceleration of the last sample, where they are known.
+        let mut rates = if moving { [None; 2] } else { [Some(JointVector::ZERO); 2] };
         for sample in 0..=end_ns / SAMPLE_NS + 3 {
             let (knot, q) = cursor.at((sample * SAMPLE_NS).min(end_ns));
             let centre = path.on_surface(knot).then(|| pad.centre(&q));
             if let Some((last, from)) = before {
                 let velocity = JointVector::from_fn(|j| (q[j] - last[j]) / SAMPLE);
-                let acceleration = JointVector::from_fn(|j| (velocity[j] - rates[0][j]) / SAMPLE);
+                let change = |to: JointVector, from: JointVector| {
+                    JointVector::from_fn(|j| (to[j] - from[j]) / SAMPLE)
+                };
+                let acceleration = rates[0].map(|last| change(velocity, last));
+                let jerk = acceleration.zip(rates[1]).map(|(to, from)| change(to, from));
+                let size = |of: Option<JointVector>, j: usize| of.map_or(0.0, |v| v[j].abs());
                 for (j, joint) in joints.iter_mut().enumerate() {
                     joint.effort_share += (q[j] - last[j]).abs();
                     joint.velocity = joint.velocity.max(velocity[j].abs());
-                    joint.acceleration = joint.acceleration.max(acceleration[j].abs());
-                    joint.jerk = joint.jerk.max((acceleration[j] - rates[1][j]).abs() / SAMPLE);
+                    joint.acceleration = joint.acceleration.max(size(acceleration, j));
+                    joint.jerk = joint.jerk.max(size(jerk, j));
                 }
-                rates = [velocity, acceleration];
+                rates = [Some(velocity), acceleration];
                 match from.zip(centre) {
                     Some((from, to)) => {
                         let speed = (to - from).norm() / SAMPLE;
@@ -140,7 +147,29 @@ impl Dips {
 
 #[cfg(test)]
 mod tests {
+    use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
+
     use super::*;
+    use crate::plan::{PlanKnot, Profile};
+
+    /// What the plan before it did is not this plan's acceleration.
+    #[test]
+    fn a_plan_that_begins_in_motion_does_not_begin_with_a_jolt() {
+        let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+        // From 0.5 rad/s to rest: q = 0.5 (t − t²/2), so −0.5 rad/s² all along.
+        let knot = |time: f64| {
+            let (mut q, mut v) = (JointVector::ZERO, JointVector::ZERO);
+            (q[0], v[0]) = (0.5 * (time - 0.5 * time * time), 0.5 * (1.0 - time));
+            PlanKnot { time_ns: (time * 1e9) as u64, q, v, line: None, patch: None }
+        };
+        let knots: Vec<PlanKnot> = (0..=4).map(|k| knot(0.25 * f64::from(k))).collect();
+        let (tool, profile) = (Tool::default(), Profile::Acceleration);
+        let path = Trajectory { tool: &tool, profile, knots: &knots };
+        let of = |moving: bool| Pace::of(path, moving, &arm, DIP).joints[0].clone();
+        assert!((of(true).acceleration - 0.5).abs() < 1e-3, "{:?}", of(true));
+        // From rest it is a step of 0.5 rad/s in a cycle.
+        assert!(of(false).acceleration > 400.0, "{:?}", of(false));
+    }
 
     #[test]
     fn a_dip_is_a_fall_and_a_rise_on_the_surface() {

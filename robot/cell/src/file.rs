@@ -54,7 +54,7 @@ pub struct Cell {
 pub struct Limits {
     /// One velocity for all joints, where the robot's own limits are higher. \[rad/s\]
     pub v_max: Option<f64>,
-    /// `velocity` or `acceleration`.
+    /// `velocity`, `acceleration` or `jerk`.
     pub profile: Option<String>,
 }
 

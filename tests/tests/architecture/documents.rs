@@ -7,7 +7,14 @@ use crate::packages::{Kind, Package, packages};
 use crate::programs::Commands;
 use crate::tree::{Offence, Tree, extension, folder, join};
 
-/// Chapters of the book that are not there, and pages of its folder that are no chapters.
+/// The repository's pages, by which the book leads to what is no chapter.
+const HOME: [&str; 2] = [
+    "https://github.com/nullsweep/nullsweep/blob/main/",
+    "https://github.com/nullsweep/nullsweep/tree/main/",
+];
+
+/// Chapters of the book that are not there, pages of its folder that are no chapters, and links out of
+/// the book, which lead nowhere once it is built.
 pub(crate) fn check_book(tree: &Tree, summary: &str) -> Vec<Offence> {
     let text = tree.with_extension("md").find(|(path, _)| *path == summary).map(|(_, text)| text);
     let Some(text) = text else { return vec![Offence::new(summary, 0, "there is no book")] };
@@ -17,7 +24,22 @@ pub(crate) fn check_book(tree: &Tree, summary: &str) -> Vec<Offence> {
     let pages = tree.with_extension("md").map(|(path, _)| path);
     let pages = pages.filter(|path| folder(path) == folder(summary) && *path != summary);
     let told = |path| Offence::new(path, 0, format!("is no chapter of {summary}"));
-    pages.filter(|path| !chapters.iter().any(|one| one == path)).map(told).collect()
+    let mut offences: Vec<Offence> =
+        pages.filter(|path| !chapters.iter().any(|one| one == path)).map(told).collect();
+    let is_chapter = |page: &str| chapters.iter().any(|one| one == page);
+    for (page, text) in tree.with_extension("md").filter(|(page, _)| is_chapter(page)) {
+        for piece in pieces(text).iter().filter(|piece| piece.kind == markdown::Kind::Link) {
+            let Some(path) = link_path(&piece.text).and_then(|path| join(folder(page), path))
+            else {
+                continue;
+            };
+            if !path.starts_with(folder(summary)) {
+                let text = format!("{} leads out of the book: say {}{path}", piece.text, HOME[0]);
+                offences.push(Offence::new(page, piece.line, text));
+            }
+        }
+    }
+    offences
 }
 
 /// Files with these extensions are of the repository, not of a user.
@@ -82,6 +104,11 @@ impl Known<'_> {
     fn missing_in_link(&self, document: &str, target: &str) -> Option<String> {
         let (path, anchor) = target.split_once('#').unwrap_or((target, ""));
         let leads = match link_path(target) {
+            None if HOME.iter().any(|home| path.starts_with(home)) => HOME
+                .iter()
+                .find_map(|home| path.strip_prefix(home))
+                .map(|path| path.trim_end_matches('/').to_owned())
+                .filter(|path| self.tree.has(path)),
             Some(path) => join(folder(document), path).filter(|path| self.tree.has(path)),
             None if path.is_empty() => Some(document.to_owned()),
             None => return None,
@@ -201,6 +228,11 @@ mod tests {
         let document = "# The one, and more\n[a](#the-one-and-more), [b](d.md#the-one-and-more),\n\
             [c](../x/src/deep/a.rs#L1)\n[d](#gone), [e](d.md#the-one)\n";
         assert_eq!(told(document), ["no #gone", "no #the-one"]);
+        let home = "https://github.com/nullsweep/nullsweep";
+        let document = format!(
+            "[a]({home}/tree/main/x/src/), [b]({home}/blob/main/x/src/gone.rs), [c]({home})"
+        );
+        assert_eq!(told(&document), [format!("no {home}/blob/main/x/src/gone.rs")]);
     }
 
     #[test]
@@ -211,6 +243,14 @@ mod tests {
         let told = check_book(&tree, "d/SUMMARY.md");
         assert_eq!(told, [Offence::new("d/b.md", 0, "is no chapter of d/SUMMARY.md")]);
         assert_eq!(check_book(&tree, "e/SUMMARY.md").len(), 1);
+        let page =
+            "[a](a.md#x), [b](../x.md), [c](https://github.com/nullsweep/nullsweep/blob/main/x.md)";
+        let tree = Tree::of(&[("d/SUMMARY.md", book), ("d/a.md", page), ("x.md", "")]);
+        let told = check_book(&tree, "d/SUMMARY.md");
+        assert!(
+            matches!(&told[..], [one] if one.text.starts_with("../x.md leads out")),
+            "{told:?}"
+        );
     }
 
     #[test]

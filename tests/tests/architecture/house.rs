@@ -75,8 +75,8 @@ pub(crate) const CRATES: &[Crate] = &[
         ],
     ),
     with("fuzz", &["tests/inputs"]),
-    with("pr2-bridge", &["ipc-types", "robot", "executor", "bridge"]),
-    with("ros2-bridge", &["ipc-types", "robot", "executor", "bridge"]),
+    with("pr2-bridge", &["ipc-types", "robot", "robot/cell", "executor", "bridge"]),
+    with("ros2-bridge", &["ipc-types", "robot", "robot/cell", "executor", "bridge"]),
 ];
 
 /// Crates that share the wire and nothing else: no way may lead from one to the other.

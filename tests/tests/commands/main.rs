@@ -69,7 +69,7 @@ fn every_flag_that_a_document_names_is_taken() {
 
 #[test]
 fn the_front_knows_every_command_of_planner_and_executor() {
-    let front = fs::read_to_string(root().join("planner/front/src/main.rs")).expect("a source");
+    let front = fs::read_to_string(root().join("planner/front/src/lib.rs")).expect("a source");
     for (program, name) in [("planner", "PLANNER"), ("executor", "EXECUTOR")] {
         let commands = session::commands(program);
         assert!(commands.len() > 3, "{commands:?}");

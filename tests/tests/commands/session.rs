@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::blocks::{Block, Mark};
 
-/// Each program, and what it is here: the demo plays planner and executor too.
+/// Each program, and what it is here: the demo plays planner, executor and front too.
 const DEMO: &str = env!("CARGO_BIN_EXE_demo");
 const MOCK: &str = env!("CARGO_BIN_EXE_mock-hardware");
 /// A loaded machine may stall a process for longer than a robot would bear.
@@ -60,11 +60,12 @@ impl Session {
         let patient = format!("[ \"$1\" = run ] && set -- \"$@\" {PATIENCE}");
         script("executor", &format!("{patient}\nexec {DEMO} __executor \"$@\""));
         script("mock-hardware", &format!("exec {MOCK} --timeout 500 \"$@\""));
-        script(
-            "nullsweep",
-            "case $1 in\nrun|ctl|top|replay) exec executor \"$@\" ;;\n\
-             mock|endpoint) shift; exec mock-hardware \"$@\" ;;\n*) exec planner \"$@\" ;;\nesac",
-        );
+        // The front starts what lies beside it: the scripts.
+        let front = bin.join("front");
+        if fs::hard_link(DEMO, &front).is_err() {
+            fs::copy(DEMO, &front).expect("copied");
+        }
+        script("nullsweep", &format!("exec {} __front \"$@\"", front.display()));
         Self { folder }
     }
 
