@@ -73,14 +73,18 @@ pub(super) fn object(
     }
     let index = chosen(scan, &room, choice)?;
     let segment = &room.segments[index];
-    let (low, high) = (segment.bounds.min, segment.bounds.max);
+    let corner = |p: &Point3<f64>| format!("{:.2}, {:.2}, {:.2}", p.x, p.y, p.z);
+    let planes = match room.planes.len() {
+        1 => "1 plane is an obstacle as far as it was seen".into(),
+        count => format!("{count} planes are obstacles as far as they were seen"),
+    };
     bars.note(&format!(
-        "object {} of {count}: {} points from {low:.2} to {high:.2} m, on the {}; {} planes are \
-         obstacles as far as they were seen",
+        "object {} of {count}: {} points from {} to {} m, on the {}; {planes}",
         index + 1,
         segment.points,
+        corner(&segment.bounds.min),
+        corner(&segment.bounds.max),
         name(room.planes[segment.stands_on].kind),
-        room.planes.len()
     ));
     let (surface, _) = scan::clean(&segment.split(scan).0, &CleanConfig::default())?;
     let (mut scene, flying) = Scene::around(surface, scan);

@@ -36,13 +36,25 @@ impl std::fmt::Display for LeftOut {
         }?;
         match (&self.cause, self.short) {
             (Cause::Limit { .. }, Some([least, most])) => {
-                write!(f, ", by {least:.2} … {most:.2} rad or m")
+                write!(f, ", by {} rad or m", span(least, most, 2))
             }
             (_, Some([least, most])) => {
-                write!(f, ", short by {:.0} … {:.0} mm", 1e3 * least, 1e3 * most)
+                write!(f, ", short by {} mm", span(1e3 * least, 1e3 * most, 0))
             }
             (_, None) => Ok(()),
         }
+    }
+}
+
+/// From the least to the most with so many digits; what is too little for them is told as that.
+fn span(least: f64, most: f64, digits: usize) -> String {
+    let smallest = 0.1_f64.powi(digits as i32);
+    let [low, high] = [least, most].map(|value| format!("{value:.digits$}"));
+    match (least < 0.5 * smallest, most < 0.5 * smallest) {
+        (_, true) => format!("less than {smallest:.digits$}"),
+        (true, false) => format!("up to {high}"),
+        _ if low == high => high,
+        _ => format!("{low} … {high}"),
     }
 }
 
@@ -112,4 +124,19 @@ pub(super) fn in_words(causes: &[LeftOut]) -> String {
     const FEW: usize = 4;
     let said = causes.iter().take(FEW).map(|c| format!("{}: {c}", c.cause));
     said.collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_span_goes_from_nothing_to_nothing() {
+        assert_eq!(span(0.01, 0.3, 0), "less than 1");
+        assert_eq!(span(0.2, 3.4, 0), "up to 3");
+        assert_eq!(span(0.9, 1.4, 0), "1");
+        assert_eq!(span(1.0, 5.2, 0), "1 … 5");
+        assert_eq!(span(0.026, 0.474, 2), "0.03 … 0.47");
+        assert_eq!(span(0.001, 0.004, 2), "less than 0.01");
+    }
 }

@@ -69,8 +69,8 @@ impl Session {
         Self { folder }
     }
 
-    /// Runs blocks one after another, and asserts that every command goes well.
-    pub(crate) fn run(&self, blocks: &[Block]) {
+    /// Runs blocks one after another, asserts that every command goes well, and gives what they said.
+    pub(crate) fn run(&self, blocks: &[Block]) -> String {
         let mut text = String::from("set -eu\n");
         for block in blocks {
             let background = matches!(block.mark, Mark::Background(_));
@@ -100,7 +100,7 @@ impl Session {
             .expect("a shell");
         let said = fs::read_to_string(said).expect("output");
         assert!(status.success(), "{status}:\n{said}");
-        println!("{said}");
+        said
     }
 }
 
