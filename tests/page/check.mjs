@@ -94,16 +94,17 @@ if (moves) {
   // What lies over the canvas must let the mouse through.
   await page.evaluate('scrollTo(0, 0)');
   const canvas = await page.locator('#space').boundingBox();
-  const middle = [canvas.x + canvas.width / 2, canvas.y + canvas.height / 2];
+  const held = [canvas.x + canvas.width / 2, canvas.y + canvas.height / 2];
   const eye = () => page.evaluate('JSON.stringify(nullsweep.camera)');
-  const before = await eye();
-  await page.mouse.move(...middle);
+  const stood = await eye();
+  await page.mouse.move(...held);
   await page.mouse.down();
-  await page.mouse.move(middle[0] + 40, middle[1] + 10);
+  await page.mouse.move(held[0] + 40, held[1] + 10);
   await page.mouse.up();
   await settle();
-  check('the mouse turns the scene', await eye() !== before, '40 pixels to the right');
+  check('the mouse turns the scene', await eye() !== stood, '40 pixels to the right');
   await page.keyboard.press('f');
+  await settle();
   if (await page.evaluate('nullsweep.measured.length')) {
     const button = page.getByRole('button', { name: 'measured path' });
     const shown = await pixels();
