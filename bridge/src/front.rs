@@ -306,7 +306,7 @@ mod tests {
             guard,
             fingerprint: 1,
             held_continuous: Vec::new(),
-            held_tolerance: nullsweep_executor::Guard::HELD_TOLERANCE,
+            held_tolerance: Guard::HELD_TOLERANCE,
             since_ns: 1,
         };
         let mut header = nullsweep_ipc_types::PlanHeader {

@@ -173,7 +173,8 @@ fn publish(error: &PublishError) -> Option<String> {
              motion; any other one once the arm rests at its start: `planner goto --plan PLAN`"
         }
         PublishError::Rejected(event) if event.reason == Reason::NotReady.wire() => {
-            "is the endpoint running? `executor ctl status` tells more"
+            "`executor ctl status` says why: a fault, which `executor ctl reset` clears once its cause is \
+             gone, or an endpoint that does not run"
         }
         PublishError::Plan(error) => return plan(error),
         _ => return None,

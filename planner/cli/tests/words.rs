@@ -97,6 +97,62 @@ fn a_note_is_told_once() {
     assert_eq!(said.matches("home is taken to be").count(), 1, "{said}");
 }
 
+/// How a way is planned says nothing where none is asked for; what a cell says does not count as said.
+#[test]
+fn flags_of_the_way_to_the_start_need_goto() {
+    let folder = tempfile::tempdir().expect("a folder");
+    long_plan(&folder.path().join("plan.json"));
+    for flag in ["--empty", "--v-max 0.2", "--profile jerk", "--seed 3", "--up 0,0,1"] {
+        let (code, _, said) = run(folder.path(), &format!("publish plan.json {flag}"));
+        assert_eq!(code, Some(2), "{flag}: {said}");
+        assert!(said.contains("--goto"), "{flag}: {said}");
+    }
+    let cell = "[limits]\nv_max = 0.2\n[scene]\nup = [0, 0, 1]\n";
+    std::fs::write(folder.path().join("cell.toml"), cell).expect("written");
+    let (code, _, said) = run(folder.path(), "publish plan.json");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("verif"), "the plan is looked at: {said}");
+}
+
+/// A scan of an object alone has nothing to choose from, and it is said what to do instead.
+#[test]
+fn a_scene_without_objects_is_told_in_words() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // A ball: no plane.
+    let points: String = (0..4000)
+        .map(|i| {
+            let (z, turn) = (f64::from(i) / 2000.0 - 1.0, 2.4 * f64::from(i));
+            let r = (1.0 - z * z).sqrt();
+            format!("{} {} {}\n", 0.1 * r * turn.cos(), 0.1 * r * turn.sin(), 0.3 + 0.1 * z)
+        })
+        .collect();
+    std::fs::write(folder.path().join("scan.xyz"), points).expect("written");
+    let (code, told, said) = run(folder.path(), "scene scan.xyz --up 0,0,1 --sensor-height 1");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(told.starts_with("no plane was found"), "{told}");
+    assert!(told.contains("leave out --object") && !told.contains("points or m"), "{told}");
+    let (code, _, said) =
+        run(folder.path(), "plan scan.xyz --up 0,0,1 --sensor-height 1 --object largest");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("leave out --object") && !said.contains("planner scene"), "{said}");
+}
+
+/// Whoever typed `nullsweep` is told of commands of `nullsweep`.
+#[test]
+fn behind_a_front_it_speaks_of_the_front() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("plan.json"), "no plan").expect("written");
+    for (front, own, advice) in [
+        ("", "planner: ", "help: `planner plan`"),
+        ("nullsweep", "nullsweep: ", "help: `nullsweep plan`"),
+    ] {
+        let mut inspect = planner(folder.path(), "inspect plan.json");
+        let output = inspect.env(nullsweep_cell::FRONT, front).output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.starts_with(own) && said.contains(advice), "{said}");
+    }
+}
+
 #[test]
 fn a_scene_file_is_taken_beside_a_cell_that_says_which_way_is_up() {
     let folder = tempfile::tempdir().expect("a folder");
