@@ -24,6 +24,7 @@ use crate::messages::{
     CancelRequest, CancelResponse, FollowFeedback, FollowGoal, FollowResult, GoalInfo, Header,
     JointState, JointTrajectory, JointTrajectoryPoint,
 };
+use crate::threads::Threads;
 use crate::trajectory::ros_time;
 
 /// Time between two words about how a goal goes.
@@ -57,11 +58,28 @@ pub struct Door {
     told: Instant,
     /// What was last told of all goals.
     statuses: Vec<(GoalId, Status)>,
+    /// The library's, which are to live as long as this.
+    threads: Threads,
 }
 
 impl Door {
     /// Opens it in a domain.
     pub fn open(
+        common: &Common,
+        controller: &str,
+        with_states: bool,
+        names: Vec<String>,
+    ) -> anyhow::Result<Self> {
+        let (threads, door) = Threads::of(|| Self::build(common, controller, with_states, names));
+        Ok(Self { threads, ..door? })
+    }
+
+    /// Whether nothing can be heard and said any more: the library's threads have ended.
+    pub fn is_deaf(&self) -> bool {
+        self.threads.has_ended()
+    }
+
+    fn build(
         common: &Common,
         controller: &str,
         with_states: bool,
@@ -113,6 +131,7 @@ impl Door {
             shown_ns: 0,
             told,
             statuses: Vec::new(),
+            threads: Threads::default(),
         })
     }
 
