@@ -188,15 +188,16 @@ impl Plan {
         make(py, progress, move |told| calls::verify(&words, &plan, told))
     }
 
-    /// Writes it for other programs: `csv`, `json` or `ros-yaml`; without a path as text.
+    /// Writes it for other programs: `csv`, `json`, `ros-yaml` or `ros2-yaml`; without a path as text.
     #[pyo3(signature = (path=None, *, format="csv"))]
     fn export(&self, path: Option<PathBuf>, format: &str) -> PyResult<Option<String>> {
         let format = match format {
             "csv" => Format::Csv,
             "json" => Format::Json,
             "ros-yaml" => Format::RosYaml,
+            "ros2-yaml" => Format::Ros2Yaml,
             other => {
-                let why = format!("format: {other} is none of csv, json, ros-yaml");
+                let why = format!("format: {other} is none of csv, json, ros-yaml, ros2-yaml");
                 return Err(UsageError::new_err(why));
             }
         };

@@ -1,11 +1,16 @@
 //! Keywords as a command's words: `ik_samples=20` is `--ik-samples=20`.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
+
+use crate::errors::UsageError;
+
+/// Flags of a command alone: what it writes is returned here, and what it reads is given otherwise.
+const ELSEWHERE: [&str; 7] = ["out", "json", "report", "cell", "continue", "help", "version"];
 
 /// Each keyword as a flag; `None` and `False` say nothing, `True` is a flag without a value, of a
 /// dictionary each item is NAME=VALUE, numbers of a sequence stand apart by commas, and a sequence of
@@ -14,6 +19,9 @@ pub(crate) fn of(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<OsString>
     let mut words = Vec::new();
     for (name, value) in keywords.into_iter().flatten() {
         let name: String = name.extract()?;
+        if ELSEWHERE.contains(&name.as_str()) {
+            return Err(UsageError::new_err(format!("{name}: a command has it, a function has not")));
+        }
         for value in values(&name, &value)? {
             let mut word = OsString::from(format!("--{}", name.replace('_', "-")));
             if let Some(value) = value {
@@ -45,12 +53,13 @@ fn values(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Option<OsString>
     if let Some(single) = single(value) {
         return Ok(vec![Some(single)]);
     }
-    // Numbers are one value, of whatever they consist; other things are several.
-    if value.extract::<Vec<f64>>().is_ok() {
+    // With numbers among them they are one value; other things are several.
+    let items = value.try_iter()?.collect::<PyResult<Vec<_>>>()?;
+    let is_number = |item: &Bound<'_, PyAny>| item.extract::<f64>().is_ok();
+    if items.iter().any(is_number) {
         return Ok(vec![Some(word(name, value)?)]);
     }
-    let each = |item: PyResult<Bound<'_, PyAny>>| word(name, &item?).map(Some);
-    value.try_iter()?.map(each).collect()
+    items.iter().map(|item| word(name, item).map(Some)).collect()
 }
 
 /// Text, a number or a path.
@@ -73,10 +82,10 @@ fn word(name: &str, value: &Bound<'_, PyAny>) -> PyResult<OsString> {
     if let Some(single) = single(value) {
         return Ok(single);
     }
-    let numbers: Vec<f64> = value.extract().map_err(|_| {
-        PyTypeError::new_err(format!("{name}: text, a number, a path or numbers are wanted"))
-    })?;
-    let apart = if name == "table" { "x" } else { "," };
-    let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
-    Ok(numbers.join(apart).into())
+    let wanted =
+        || PyTypeError::new_err(format!("{name}: text, a number, a path or numbers are wanted"));
+    let items = value.try_iter().map_err(|_| wanted())?;
+    let part = |item: PyResult<Bound<'_, PyAny>>| single(&item?).ok_or_else(wanted);
+    let parts = items.map(part).collect::<PyResult<Vec<_>>>()?;
+    Ok(parts.join(OsStr::new(if name == "table" { "x" } else { "," })))
 }

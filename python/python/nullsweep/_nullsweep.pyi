@@ -169,7 +169,7 @@ class Plan:
         progress: Optional[Progress] = None,
     ) -> Plan: ...
     def export(
-        self, path: Optional[Path] = None, *, format: Literal["csv", "json", "ros-yaml"] = "csv"
+        self, path: Optional[Path] = None, *, format: Literal["csv", "json", "ros-yaml", "ros2-yaml"] = "csv"
     ) -> Optional[str]: ...
     def report(self, path: Optional[Path] = None) -> Optional[str]: ...
     def _repr_html_(self) -> str: ...
@@ -209,7 +209,7 @@ def task(
     *,
     scan: Optional[Scan] = None,
     progress: Optional[Progress] = None,
-    tolerance: Optional[str] = None,
+    tolerance: Union[str, Sequence[Union[float, str]], None] = None,
     floor: Optional[float] = None,
     base: Optional[Sequence[float]] = None,
     torso: Optional[float] = None,
