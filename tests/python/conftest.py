@@ -13,7 +13,7 @@ import nullsweep
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SAMPLE = ROOT / "examples/sample"
 # Quick, and enough for what is looked at.
-SETTINGS = {"ik_samples": 12, "base": (0.0, 0.0, 0.0)}
+SETTINGS = {"ik_samples": 12}
 
 
 @pytest.fixture(scope="session")
