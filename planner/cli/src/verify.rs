@@ -9,12 +9,12 @@ use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::verify::{Given, Verification, verify};
 use nullsweep_planner::workcell::Scene;
-use nullsweep_report::{ReportData, Table};
+use nullsweep_report::ReportData;
 use nullsweep_robot::{ArmSpec, Robot};
 
 use crate::bars::Bars;
 use crate::exit::{OK, VIOLATIONS};
-use crate::figures::verified_rows;
+use crate::figures::{verified_rows, verified_table};
 use crate::json::write_json;
 use crate::output::{say, writable};
 use crate::picture::{Sitter, picture};
@@ -138,11 +138,7 @@ impl Checked {
             verification: Some(&self.verification),
             left_out: &[],
             flights: &[],
-            tables: vec![Table {
-                title: "Verified now".into(),
-                columns: vec!["figure".into(), "value".into()],
-                rows: verified_rows(&self.verification).into_iter().map(Vec::from).collect(),
-            }],
+            tables: vec![verified_table(&self.verification)],
             lines: Vec::new(),
         })
     }
