@@ -7,9 +7,11 @@ use nullsweep_gtsp::tsplib::read_gtsp;
 use nullsweep_gtsp::{self as gtsp, Budget, Costs, Effort, Ends, Instance, Jump, lower_bound};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::{numbers, shaped};
 use crate::errors::{UsageError, raise, shape};
+use crate::keywords::Keywords;
 
 /// A tour.
 #[pyclass(frozen, get_all, module = "nullsweep.gtsp")]
@@ -40,21 +42,20 @@ impl Solution {
 
 /// Visits each cluster once, at one node of it, for the least cost.
 #[pyfunction]
-#[pyo3(signature = (costs, clusters, *, seconds=None, trials=None, seed=1, threads=0, jump=None,
-                    start=None, bound=0.0))]
-#[allow(clippy::too_many_arguments, reason = "keywords of Python's, each with a default")]
+#[pyo3(signature = (costs, clusters, **how))]
 pub(crate) fn solve(
     py: Python<'_>,
     costs: &Bound<'_, PyAny>,
     clusters: Vec<Vec<usize>>,
-    seconds: Option<f64>,
-    trials: Option<u64>,
-    seed: u64,
-    threads: usize,
-    jump: Option<f64>,
-    start: Option<usize>,
-    bound: f64,
+    how: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Solution> {
+    let how = Keywords::of(py, how)?;
+    let (seconds, trials) = (how.take("seconds", None)?, how.take("trials", None)?);
+    let (seed, threads) = (how.take("seed", 1)?, how.take("threads", 0)?);
+    let jump = how.take("jump", None)?.map_or(Jump::Forbidden, Jump::Uniform);
+    let ends = how.take("start", None)?.map_or(Ends::Closed, Ends::OpenFromCluster);
+    let bound: f64 = how.take("bound", 0.0)?;
+    how.end()?;
     let array = numbers(costs)?;
     let found = array.shape();
     let &[n, columns] = found else { return Err(shape("costs", "(n, n)", found)) };
@@ -65,8 +66,6 @@ pub(crate) fn solve(
     let given = array.as_slice()?;
     let dense = order.iter().flat_map(|&a| order.iter().map(move |&b| given[a * n + b])).collect();
     let sizes: Vec<usize> = clusters.iter().map(Vec::len).collect();
-    let jump = jump.map_or(Jump::Forbidden, Jump::Uniform);
-    let ends = start.map_or(Ends::Closed, Ends::OpenFromCluster);
     let instance = Instance::new(&sizes, Costs::Dense(dense), jump, ends).map_err(raise)?;
     let seconds = seconds.or_else(|| trials.is_none().then_some(10.0));
     let time = seconds.map(|s| span("seconds", s)).transpose()?;

@@ -12,6 +12,7 @@ mod cell;
 mod errors;
 mod executor;
 mod gtsp;
+mod keywords;
 mod listener;
 mod plan;
 mod planning;

@@ -15,8 +15,8 @@ use pyo3::prelude::*;
 
 use crate::arrays::{of_joints, of_points};
 use crate::cell::Cell;
-use crate::errors::{Error, UsageError, file, raise, raised};
-use crate::planning::make;
+use crate::errors::{BrokenPlanError, Error, UsageError, file, raise, raised};
+use crate::listener::Listener;
 use crate::scan::Scan;
 
 /// A timed joint path that sweeps a surface.
@@ -254,4 +254,30 @@ impl Plan {
 /// Text as it stands within an attribute or an element.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;")
+}
+
+/// A plan, without Python's lock while it is made.
+pub(crate) fn make(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(calls::Listener) -> anyhow::Result<Planned> + Send,
+) -> PyResult<Py<Plan>> {
+    let listener = Arc::new(Listener::new(progress));
+    let told: calls::Listener = Arc::clone(&listener) as calls::Listener;
+    let made = py.detach(|| work(told)).map_err(raised);
+    let notes = listener.notes()?;
+    let made = made?;
+    let broken: Vec<String> = made
+        .violations
+        .iter()
+        .map(|v| format!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail))
+        .collect();
+    let plan = Py::new(py, Plan::made(made, notes))?;
+    if broken.is_empty() {
+        return Ok(plan);
+    }
+    let error = BrokenPlanError::new_err(format!("the plan breaks {} rules", broken.len()));
+    error.value(py).setattr("plan", plan)?;
+    error.value(py).setattr("violations", broken)?;
+    Err(error)
 }

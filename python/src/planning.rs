@@ -1,8 +1,6 @@
 //! Making plans.
 
-use std::sync::Arc;
-
-use nullsweep_cli::calls::{self, Planned};
+use nullsweep_cli::calls;
 use nullsweep_planner::pipeline::After;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -10,31 +8,32 @@ use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::cell::Cell;
-use crate::errors::{BrokenPlanError, raised};
-use crate::listener::Listener;
-use crate::plan::Plan;
+use crate::keywords::Keywords;
+use crate::plan::{Plan, make};
 use crate::scan::Scan;
 use crate::words;
 
 /// Makes a verified plan that sweeps a scan. Keywords beside these are `planner plan`'s flags.
 #[pyfunction]
-#[pyo3(signature = (scan, cell=None, *, progress=None, after=None, again=false, **settings))]
+#[pyo3(signature = (scan, cell=None, *, progress=None, after=None, **settings))]
 pub(crate) fn plan(
     py: Python<'_>,
     scan: &Scan,
     cell: Option<&Cell>,
     progress: Option<Py<PyAny>>,
     after: Option<(PyRef<'_, Plan>, usize)>,
-    again: bool,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<Plan>> {
+    let settings = Keywords::of(py, settings)?;
+    // As a flag it asks for a plan's file.
+    let again = settings.take("again", false)?;
     let after =
         after.map(|(plan, knot)| After { plan: plan.inner().clone(), knot, held: None, again });
     if again && after.is_none() {
         return Err(PyTypeError::new_err("again: with after=(plan, knot) alone"));
     }
     let cell = cell.map_or_else(|| Cell::default_one().of_plan(), Cell::of_plan);
-    let words = scan.before(&[cell, words::of(settings)?].concat());
+    let words = scan.before(&[cell, words::of(Some(&settings.rest()))?].concat());
     make(py, progress, |told| calls::plan(&words, after, told))
 }
 
@@ -57,30 +56,4 @@ pub(crate) fn task(
         words.extend(scan.around()?);
     }
     make(py, progress, |told| calls::task(&words, poses, told))
-}
-
-/// A plan, without Python's lock while it is made.
-pub(crate) fn make(
-    py: Python<'_>,
-    progress: Option<Py<PyAny>>,
-    work: impl FnOnce(calls::Listener) -> anyhow::Result<Planned> + Send,
-) -> PyResult<Py<Plan>> {
-    let listener = Arc::new(Listener::new(progress));
-    let told: calls::Listener = Arc::clone(&listener) as calls::Listener;
-    let made = py.detach(|| work(told)).map_err(raised);
-    let notes = listener.notes()?;
-    let made = made?;
-    let broken: Vec<String> = made
-        .violations
-        .iter()
-        .map(|v| format!("violation at knot {}: {:?}: {}", v.knot, v.kind, v.detail))
-        .collect();
-    let plan = Py::new(py, Plan::made(made, notes))?;
-    if broken.is_empty() {
-        return Ok(plan);
-    }
-    let error = BrokenPlanError::new_err(format!("the plan breaks {} rules", broken.len()));
-    error.value(py).setattr("plan", plan)?;
-    error.value(py).setattr("violations", broken)?;
-    Err(error)
 }

@@ -5,9 +5,11 @@ use std::time::Duration;
 use nullsweep_ipc_types::PlanEvent;
 use nullsweep_planner::link::publish::{self as link, Join, Patience, Watcher, describe_for};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::cell::Cell;
 use crate::errors::{UsageError, raise};
+use crate::keywords::Keywords;
 use crate::plan::Plan;
 
 /// Tells a callback what becomes of a plan.
@@ -28,23 +30,23 @@ impl Watcher for Told {
 
 /// Sends a plan to the executor and waits for its admission, or for its end; its id.
 #[pyfunction]
-#[pyo3(signature = (plan, cell=None, *, join=None, wait=false, timeout=5.0, unverified=false, event=None))]
-#[allow(clippy::too_many_arguments, reason = "keywords of Python's, each with a default")]
+#[pyo3(signature = (plan, cell=None, **how))]
 pub(crate) fn publish(
     py: Python<'_>,
     plan: PyRef<'_, Plan>,
     cell: Option<&Cell>,
-    join: Option<&str>,
-    wait: bool,
-    timeout: f64,
-    unverified: bool,
-    event: Option<Py<PyAny>>,
+    how: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<String> {
+    let how = Keywords::of(py, how)?;
+    let (join, event) = (how.take::<Option<String>>("join", None)?, how.take("event", None)?);
+    let (wait, unverified) = (how.take("wait", false)?, how.take("unverified", false)?);
+    let timeout = how.take("timeout", 5.0)?;
+    how.end()?;
     let plan = plan.inner();
     if !unverified {
         plan.check_seal().map_err(raise)?;
     }
-    let join = match join {
+    let join = match join.as_deref() {
         None if plan.continues.is_some() => Join::Knot,
         None | Some("stop") => Join::Stop,
         Some("after") => Join::After,

@@ -20,7 +20,9 @@ pub(crate) fn of(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<OsString>
     for (name, value) in keywords.into_iter().flatten() {
         let name: String = name.extract()?;
         if ELSEWHERE.contains(&name.as_str()) {
-            return Err(UsageError::new_err(format!("{name}: a command has it, a function has not")));
+            return Err(UsageError::new_err(format!(
+                "{name}: a command has it, a function has not"
+            )));
         }
         for value in values(&name, &value)? {
             let mut word = OsString::from(format!("--{}", name.replace('_', "-")));

@@ -3,6 +3,7 @@
 
 use std::time::{Duration as Span, Instant};
 
+use anyhow::ensure;
 use nullsweep_ipc_types::Telemetry;
 use nullsweep_ipc_types::ports::now_ns;
 use ros2_client::action::{
@@ -74,9 +75,24 @@ impl Door {
         Ok(Self { threads, ..door? })
     }
 
-    /// Whether nothing can be heard and said any more: the library's threads have ended.
-    pub fn is_deaf(&self) -> bool {
-        self.threads.has_ended()
+    /// Whether anything can be heard and said.
+    ///
+    /// # Errors
+    /// The library's threads have ended.
+    pub fn hears(&mut self) -> anyhow::Result<()> {
+        ensure!(
+            !self.threads.has_ended(),
+            "the DDS library's threads have ended, as they do in a process that was stopped and goes \
+             on: nobody can be heard any more, the arm is stopped; start it again"
+        );
+        Ok(())
+    }
+
+    /// Leaves the domain; not where that would wait for threads that have ended.
+    pub fn leave(mut self) {
+        if self.threads.has_ended() {
+            std::mem::forget(self);
+        }
     }
 
     fn build(

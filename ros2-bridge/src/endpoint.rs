@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::Context;
 use nullsweep_bridge::{Do, Ear, Endpoint, Health, Heard, Player, moment};
@@ -19,9 +19,6 @@ use crate::trajectory::{positions, trajectory};
 
 /// Time between two looks. The executor's setpoints wait in their buffer meanwhile.
 const ROUND: Duration = Duration::from_micros(500);
-
-/// How often it is looked whether the ROS side still lives.
-const LOOK: Duration = Duration::from_millis(100);
 
 /// Runs until SIGINT or SIGTERM.
 pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
@@ -50,18 +47,14 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     let mut player = Player::new(args.period() * 1_000_000);
     let (mut told, mut ticks) = (Told::default(), Ticks::new(args.period() * 1_000_000));
     let mut placed = 0u64;
-    let mut looked = Instant::now();
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
-        if looked.elapsed() >= LOOK {
-            looked = Instant::now();
-            if link.is_deaf() {
-                tracing::error!(
-                    "the DDS library's threads have ended, as they do in a process that was stopped \
-                     and goes on: the domain is joined anew, no state is passed on until then"
-                );
-                link.again(common, args).context("the domain cannot be joined anew")?;
-            }
+        if link.is_deaf() {
+            tracing::error!(
+                "the DDS library's threads have ended, as they do in a process that was stopped and \
+                 goes on: the domain is joined anew, no state is passed on until then"
+            );
+            link.again(common, args).context("the domain cannot be joined anew")?;
         }
         let states = link.hear();
         let known = link.known();

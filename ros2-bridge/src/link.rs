@@ -69,7 +69,7 @@ impl Link {
     }
 
     /// Whether nothing can be heard and said any more: the library's threads have ended.
-    pub fn is_deaf(&self) -> bool {
+    pub fn is_deaf(&mut self) -> bool {
         self.threads.has_ended()
     }
 

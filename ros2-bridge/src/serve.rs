@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use nullsweep_bridge::{front, moment};
 use nullsweep_executor::Guard;
 use nullsweep_ipc_types::ports::{Asked, CommandClient, Ipc, PlanPublisher, Receiver, now_ns};
@@ -31,8 +31,6 @@ use crate::wish::{Wish, waypoints};
 
 /// Time between two looks.
 const ROUND: Duration = Duration::from_millis(1);
-/// How often it is looked whether the ROS side still lives.
-const LOOK: Duration = Duration::from_millis(100);
 /// An executor that has not said a word for so long is gone. \[ns\]
 const SILENT_NS: u64 = 500_000_000;
 /// How long an admission is waited for; twice that, that the arm comes to hold.
@@ -69,25 +67,13 @@ pub fn run(common: &Common, args: &ServeArgs) -> anyhow::Result<()> {
     let mut door = Door::open(common, &args.controller, args.publish_joint_states, names)?;
     let mut server = Server::open(args, &arm)?;
     tracing::info!("robot {}: goals on {}", args.robot_name, door.action());
-    let (mut sound, mut looked) = (Ok(()), Instant::now());
+    let mut sound = door.hears();
     while sound.is_ok() && !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
-        sound = server.round(&mut door);
-        if looked.elapsed() >= LOOK {
-            looked = Instant::now();
-            if door.is_deaf() {
-                sound = Err(anyhow!(
-                    "the DDS library's threads have ended, as they do in a process that was stopped \
-                     and goes on: nobody can be heard any more, the arm is stopped; start it again"
-                ));
-            }
-        }
+        sound = server.round(&mut door).and_then(|()| door.hears());
     }
     server.close(&mut door);
-    if door.is_deaf() {
-        // To leave the domain would wait for those that have ended.
-        std::mem::forget(door);
-    }
+    door.leave();
     sound
 }
 
@@ -398,8 +384,7 @@ impl Server {
             JointVector::from_fn(|j| if j < self.guard.dof { now.commanded[j] } else { 0.0 });
         let passed_ns = now_ns().saturating_sub(wish.begins_ns);
         let passed_ns = if passed_ns < AT_ONCE_NS { 0 } else { passed_ns };
-        let made = front(&wish.points, passed_ns, &holds, &self.guard);
-        let made = match made {
+        let made = match front(&wish.points, passed_ns, &holds, &self.guard) {
             Ok(made) => made,
             Err(why) => {
                 self.wish = Some(wish);

@@ -4,25 +4,40 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// This process's threads, as the kernel lists them.
 const TASKS: &str = "/proc/self/task";
 
+/// How often it is looked.
+const LOOK: Duration = Duration::from_millis(100);
+
 /// Threads that were started by one piece of work.
 #[derive(Clone, Debug, Default)]
-pub struct Threads(BTreeSet<u32>);
+pub struct Threads {
+    started: BTreeSet<u32>,
+    /// When it was last looked, and whether one had ended.
+    looked: Option<Instant>,
+    ended: bool,
+}
 
 impl Threads {
     /// Does the work, which no other work that starts or ends threads may accompany; its threads.
     pub fn of<T>(work: impl FnOnce() -> T) -> (Self, T) {
         let before = all();
         let done = work();
-        (Self(all().difference(&before).copied().collect()), done)
+        let started = all().difference(&before).copied().collect();
+        (Self { started, ..Self::default() }, done)
     }
 
     /// Whether one of them has ended.
-    pub fn has_ended(&self) -> bool {
-        self.0.iter().any(|thread| !Path::new(TASKS).join(thread.to_string()).exists())
+    pub fn has_ended(&mut self) -> bool {
+        if self.looked.is_none_or(|at| at.elapsed() >= LOOK) {
+            self.looked = Some(Instant::now());
+            let is_gone = |thread: &u32| !Path::new(TASKS).join(thread.to_string()).exists();
+            self.ended = self.started.iter().any(is_gone);
+        }
+        self.ended
     }
 }
 
@@ -34,7 +49,6 @@ fn all() -> BTreeSet<u32> {
 #[cfg(test)]
 mod tests {
     use std::process::Command;
-    use std::time::{Duration, Instant};
 
     use signal_hook::consts::SIGSTOP;
 
@@ -51,8 +65,8 @@ mod tests {
             spin(&mut node).expect("a thread");
             node
         };
-        let (threads, node) = Threads::of(node);
-        assert!(threads.0.len() >= 3, "{threads:?}");
+        let (mut threads, node) = Threads::of(node);
+        assert!(threads.started.len() >= 3, "{threads:?}");
         std::thread::sleep(Duration::from_millis(300));
         assert!(!threads.has_ended());
         let go = format!("sleep 0.3; kill -CONT {}", std::process::id());
