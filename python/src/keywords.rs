@@ -19,10 +19,8 @@ impl<'py> Keywords<'py> {
     {
         let Some(value) = self.0.get_item(name)? else { return Ok(default) };
         self.0.del_item(name)?;
-        value.extract().map_err(|why| {
-            let why: PyErr = why.into();
-            PyTypeError::new_err(format!("{name}: {}", why.value(self.0.py())))
-        })
+        let read: PyResult<T> = value.extract::<T>().map_err(Into::into);
+        read.map_err(|why| PyTypeError::new_err(format!("{name}: {}", why.value(self.0.py()))))
     }
 
     /// Those that were not taken.
