@@ -21,6 +21,7 @@ use crate::exit::Usage;
 use crate::numbers::{self, Held, finite};
 use crate::plan::PlanCommandArgs;
 use crate::robot::{RobotArgs, tool_file};
+use crate::site::SiteArgs;
 use crate::task::PoseArgs;
 use crate::verify::AgainstArgs;
 
@@ -107,9 +108,9 @@ pub fn task(
     poses: Vec<Isometry3<f64>>,
     listener: Listener,
 ) -> anyhow::Result<Planned> {
-    let args: PoseArgs = parse(words)?;
+    let args: TaskArgs = parse(words)?;
     let poses = Poses { poses, notes: Vec::new() };
-    let made = Arc::new(args.work(poses, &Bars::of(listener))?);
+    let made = Arc::new(args.task.work(poses, args.site.site(), &Bars::of(listener))?);
     let (outcome, page) = (&made.outcome, Arc::clone(&made));
     let found = &outcome.verification;
     Planned::new(&outcome.plan, found, &outcome.figures, Box::new(move || page.page()))
@@ -134,6 +135,14 @@ pub fn scene(words: &[OsString], listener: Listener) -> anyhow::Result<Scene> {
     let args: PlanCommandArgs = parse(words)?;
     let bars = Bars::of(listener);
     args.plan.scene(&bars)
+}
+
+#[derive(Debug, Args)]
+struct TaskArgs {
+    #[command(flatten)]
+    task: PoseArgs,
+    #[command(flatten)]
+    site: SiteArgs,
 }
 
 #[derive(Debug, Args)]

@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use nalgebra::Isometry3;
 use nullsweep_collision::{Obstacle, Options};
+use nullsweep_planner::link::Site;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::task::{self, TaskConfig, TaskFigures, TaskOutcome, Tolerance};
 use nullsweep_planner::workcell::{Scene, Stance};
@@ -43,6 +44,8 @@ pub(super) struct TaskArgs {
     /// Write a page that shows the arm moving along the plan.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    site: SiteArgs,
 }
 
 /// How poses are met.
@@ -98,8 +101,6 @@ pub(super) struct PoseArgs {
     /// Seed of every random choice: the same seed gives the same plan.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    #[command(flatten)]
-    site: SiteArgs,
 }
 
 pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
@@ -107,7 +108,7 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
         writable(out)?;
     }
     let bars = Bars::new();
-    let made = args.task.work(task::read(&args.poses)?, &bars)?;
+    let made = args.task.work(task::read(&args.poses)?, args.site.site(), &bars)?;
     args.finish(&made)
 }
 
@@ -145,7 +146,12 @@ impl Made {
 
 impl PoseArgs {
     /// Makes the plan through some poses.
-    pub(super) fn work(&self, found: task::Poses, bars: &Bars) -> anyhow::Result<Made> {
+    pub(super) fn work(
+        &self,
+        found: task::Poses,
+        site: Site<'_>,
+        bars: &Bars,
+    ) -> anyhow::Result<Made> {
         let task::Poses { poses, notes } = found;
         let robot = self.robot.robot()?;
         self.robot.tell(&robot, bars)?;
@@ -157,7 +163,7 @@ impl PoseArgs {
         let stance = self.stance();
         let arm = stance.bind(&robot.arm(&self.robot.spec())?)?;
         let start = |posture: &PostureArg| {
-            posture.resolve(&arm, &self.robot, self.site.site(), bars).context("--start")
+            posture.resolve(&arm, &self.robot, site, bars).context("--start")
         };
         let config = TaskConfig {
             arm: self.robot.spec(),
