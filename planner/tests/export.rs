@@ -58,6 +58,8 @@ points:
   time_from_start: {secs: 1, nsecs: 5}
 ";
     assert_eq!(text(Profile::Acceleration, Format::RosYaml), expected);
+    let ros2 = expected.replace("seq: 0, ", "").replace("nsecs", "nanosec").replace("secs", "sec");
+    assert_eq!(text(Profile::Acceleration, Format::Ros2Yaml), ros2);
     // Without velocities a controller goes straight from point to point.
     assert!(text(Profile::Velocity, Format::RosYaml).contains("velocities: []"));
 }

@@ -3,6 +3,7 @@
 
 use std::time::{Duration as Span, Instant};
 
+use anyhow::ensure;
 use nullsweep_ipc_types::Telemetry;
 use nullsweep_ipc_types::ports::now_ns;
 use ros2_client::action::{
@@ -24,6 +25,7 @@ use crate::messages::{
     CancelRequest, CancelResponse, FollowFeedback, FollowGoal, FollowResult, GoalInfo, Header,
     JointState, JointTrajectory, JointTrajectoryPoint,
 };
+use crate::threads::Threads;
 use crate::trajectory::ros_time;
 
 /// Time between two words about how a goal goes.
@@ -57,11 +59,43 @@ pub struct Door {
     told: Instant,
     /// What was last told of all goals.
     statuses: Vec<(GoalId, Status)>,
+    /// The library's, which are to live as long as this.
+    threads: Threads,
 }
 
 impl Door {
     /// Opens it in a domain.
     pub fn open(
+        common: &Common,
+        controller: &str,
+        with_states: bool,
+        names: Vec<String>,
+    ) -> anyhow::Result<Self> {
+        let (threads, door) = Threads::of(|| Self::build(common, controller, with_states, names));
+        Ok(Self { threads, ..door? })
+    }
+
+    /// Whether anything can be heard and said.
+    ///
+    /// # Errors
+    /// The library's threads have ended.
+    pub fn hears(&mut self) -> anyhow::Result<()> {
+        ensure!(
+            !self.threads.has_ended(),
+            "the DDS library's threads have ended, as they do in a process that was stopped and goes \
+             on: nobody can be heard any more, the arm is stopped; start it again"
+        );
+        Ok(())
+    }
+
+    /// Leaves the domain; not where that would wait for threads that have ended.
+    pub fn leave(mut self) {
+        if self.threads.has_ended() {
+            std::mem::forget(self);
+        }
+    }
+
+    fn build(
         common: &Common,
         controller: &str,
         with_states: bool,
@@ -113,6 +147,7 @@ impl Door {
             shown_ns: 0,
             told,
             statuses: Vec::new(),
+            threads: Threads::default(),
         })
     }
 

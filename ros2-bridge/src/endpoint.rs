@@ -14,6 +14,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use crate::args::{Common, Interface, RunArgs};
 use crate::link::{Known, Link};
 use crate::messages::JointState;
+use crate::ticks::Ticks;
 use crate::trajectory::{positions, trajectory};
 
 /// Time between two looks. The executor's setpoints wait in their buffer meanwhile.
@@ -44,9 +45,17 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     let mut endpoint = Endpoint::open(&ipc, &arm, ear, &args.timing(), args.takeover())
         .context("an endpoint runs already")?;
     let mut player = Player::new(args.period() * 1_000_000);
-    let (mut told, mut due_ns) = (Told::default(), now_ns());
+    let (mut told, mut ticks) = (Told::default(), Ticks::new(args.period() * 1_000_000));
+    let mut placed = 0u64;
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
+        if link.is_deaf() {
+            tracing::error!(
+                "the DDS library's threads have ended, as they do in a process that was stopped and \
+                 goes on: the domain is joined anew, no state is passed on until then"
+            );
+            link.again(common, args).context("the domain cannot be joined anew")?;
+        }
         let states = link.hear();
         let known = link.known();
         told.tell(known, endpoint.hears(now_ns()), args);
@@ -64,11 +73,12 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
                 (Do::LetGo, _) => player.let_go(),
             }
         }
-        if args.interface == Interface::Position && now_ns() >= due_ns {
-            due_ns = now_ns().max(due_ns + args.period() * 1_000_000);
-            if let Some(at) = player.at(now_ns()) {
-                link.place(positions(&at.q, names.len()));
-            }
+        if args.interface == Interface::Position
+            && let Some(tick_ns) = ticks.due(now_ns())
+            && let Some(at) = player.at(tick_ns)
+        {
+            placed += 1;
+            link.place(positions(placed, &at.q, names.len()));
         }
     }
     tracing::info!("ended: {}, {} messages not sent", endpoint.sum(), link.lost);

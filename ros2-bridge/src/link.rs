@@ -14,6 +14,7 @@ use crate::messages::{
     Bool, ControllerState, Float64MultiArray, JointState, JointTrajectory, SetBoolRequest,
     SetBoolResponse,
 };
+use crate::threads::Threads;
 
 /// How often it is asked who listens.
 const LOOK: Duration = Duration::from_millis(100);
@@ -54,6 +55,8 @@ pub struct Link {
     looked: Instant,
     /// When the controller last told its state. \[ns\]
     active_ns: u64,
+    /// The library's, which are to live as long as this.
+    threads: Threads,
     /// Messages that could not be sent.
     pub lost: u64,
 }
@@ -61,6 +64,25 @@ pub struct Link {
 impl Link {
     /// Joins the domain.
     pub fn open(common: &Common, args: &RunArgs) -> anyhow::Result<Self> {
+        let (threads, link) = Threads::of(|| Self::join(common, args));
+        Ok(Self { threads, ..link? })
+    }
+
+    /// Whether nothing can be heard and said any more: the library's threads have ended.
+    pub fn is_deaf(&mut self) -> bool {
+        self.threads.has_ended()
+    }
+
+    /// Joins the domain anew in place of one that is deaf: as somebody else, who knows nobody yet.
+    pub fn again(&mut self, common: &Common, args: &RunArgs) -> anyhow::Result<()> {
+        let new = Self { wanted: self.wanted, lost: self.lost, ..Self::open(common, args)? };
+        let old = std::mem::replace(self, new);
+        // It may wait for those that have ended.
+        std::thread::Builder::new().name("ros-old".into()).spawn(move || drop(old))?;
+        Ok(())
+    }
+
+    fn join(common: &Common, args: &RunArgs) -> anyhow::Result<Self> {
         let mut node = join(common, "nullsweep_bridge")?;
         let controller = absolute(&args.controller);
         let command = match args.interface {
@@ -122,6 +144,7 @@ impl Link {
             known,
             looked,
             active_ns: 0,
+            threads: Threads::default(),
             lost: 0,
         })
     }

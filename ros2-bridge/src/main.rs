@@ -12,6 +12,8 @@ mod goals;
 mod link;
 mod messages;
 mod serve;
+mod threads;
+mod ticks;
 mod trajectory;
 mod wish;
 

@@ -67,12 +67,13 @@ pub fn run(common: &Common, args: &ServeArgs) -> anyhow::Result<()> {
     let mut door = Door::open(common, &args.controller, args.publish_joint_states, names)?;
     let mut server = Server::open(args, &arm)?;
     tracing::info!("robot {}: goals on {}", args.robot_name, door.action());
-    let mut sound = Ok(());
+    let mut sound = door.hears();
     while sound.is_ok() && !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
-        sound = server.round(&mut door);
+        sound = server.round(&mut door).and_then(|()| door.hears());
     }
     server.close(&mut door);
+    door.leave();
     sound
 }
 
@@ -383,8 +384,7 @@ impl Server {
             JointVector::from_fn(|j| if j < self.guard.dof { now.commanded[j] } else { 0.0 });
         let passed_ns = now_ns().saturating_sub(wish.begins_ns);
         let passed_ns = if passed_ns < AT_ONCE_NS { 0 } else { passed_ns };
-        let made = front(&wish.points, passed_ns, &holds, &self.guard);
-        let made = match made {
+        let made = match front(&wish.points, passed_ns, &holds, &self.guard) {
             Ok(made) => made,
             Err(why) => {
                 self.wish = Some(wish);

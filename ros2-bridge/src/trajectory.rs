@@ -4,7 +4,8 @@ use nullsweep_bridge::{Message, Point, wall_time};
 use nullsweep_robot::JointVector;
 
 use crate::messages::{
-    Duration, Float64MultiArray, Header, JointTrajectory, JointTrajectoryPoint, Time,
+    Duration, Float64MultiArray, Header, JointTrajectory, JointTrajectoryPoint,
+    MultiArrayDimension, MultiArrayLayout, Time,
 };
 
 /// ROS time of a moment on `CLOCK_MONOTONIC`.
@@ -26,9 +27,15 @@ pub fn trajectory(message: &Message, names: &[String]) -> JointTrajectory {
     }
 }
 
-/// Positions as a forward_position_controller takes them.
-pub fn positions(q: &JointVector, joints: usize) -> Float64MultiArray {
-    Float64MultiArray { data: q[..joints].to_vec(), ..Float64MultiArray::default() }
+/// Positions as a forward_position_controller takes them. Their number goes as the label, which no
+/// controller reads either.
+pub fn positions(number: u64, q: &JointVector, joints: usize) -> Float64MultiArray {
+    let size = joints as u32;
+    let row = MultiArrayDimension { label: format!("nullsweep {number}"), size, stride: size };
+    Float64MultiArray {
+        layout: MultiArrayLayout { dim: vec![row], data_offset: 0 },
+        data: q[..joints].to_vec(),
+    }
 }
 
 fn point(point: &Point, joints: usize) -> JointTrajectoryPoint {
@@ -65,6 +72,11 @@ mod tests {
         assert_eq!(sent.points[0].time_from_start, Duration { sec: 0, nanosec: 10_000 });
         assert_eq!(sent.points[1].time_from_start, Duration { sec: 1, nanosec: 250_000_000 });
         assert_eq!(sent.points[1].velocities, [0.0; 6]);
-        assert_eq!(positions(&joint(0.1), 6).data, sent.points[0].positions);
+        let placed = positions(8, &joint(0.1), 6);
+        assert_eq!(placed.data, sent.points[0].positions);
+        assert_eq!(
+            (placed.layout.dim[0].label.as_str(), placed.layout.dim[0].size),
+            ("nullsweep 8", 6)
+        );
     }
 }

@@ -26,18 +26,22 @@ class Arm:
         """It does not move."""
         self.speed = [0.0] * len(self.measured)
 
-    def follow(self, q, v):
-        """One cycle, `elapsed` long: steps beyond what the velocity explains, and of the velocity
-        itself, are kept."""
+    def judge(self, q, v, elapsed):
+        """What is aimed at `elapsed` after the last: steps beyond what the velocity explains, and of
+        the velocity itself, are kept."""
         for j in range(len(q)):
             way = abs(q[j] - self.last[0][j])
-            most = max(abs(v[j]), abs(self.last[1][j])) * self.elapsed
+            most = max(abs(v[j]), abs(self.last[1][j])) * elapsed
             self.seen["step"] = max(self.seen["step"], way - most)
-            change = abs(v[j] - self.last[1][j]) - MOST * self.elapsed
+            change = abs(v[j] - self.last[1][j]) - MOST * elapsed
             self.seen["velocity_step"] = max(self.seen["velocity_step"], change)
+        self.last = (q, v)
+
+    def follow(self, q, v):
+        """One cycle, `elapsed` long, behind what is aimed at."""
+        for j in range(len(q)):
             error = abs(q[j] - self.measured[j])
             self.seen["largest_error"] = max(self.seen["largest_error"], error)
-        self.last = (q, v)
         share = 1.0 - math.exp(-self.elapsed / LAG)
         for j in range(len(q)):
             before = self.measured[j]

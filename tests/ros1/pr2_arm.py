@@ -204,6 +204,7 @@ class Controller(Arm):
                 self.rest()
                 return None
             q, v = self.desired(now)
+            self.judge(q, v, self.elapsed)
             self.follow(q, v)
             # What has ended long ago is forgotten.
             while len(self.segments) > 1 and self.segments[1].start < now - 1.0:

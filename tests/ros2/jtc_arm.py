@@ -12,7 +12,9 @@ point it holds. `controller_state` tells what it does, 50 times a second, while 
 service `/power` (std_srvs/SetBool) switches the motors, and `/running` (std_msgs/Bool) tells them.
 
 `--interface position` is a forward_position_controller instead: what comes on `commands` is where
-the joints are to be.
+the joints are to be, each message a `--period` after the last: its drives take the positions at that
+pace, whenever the message came. One that comes later than `LATE` after the last one in mid-motion
+counts as late: the arm has stood meanwhile.
 
 The arm follows the desired position with a lag of the first order; joint states go out at 100 Hz.
 At its end the node writes what it saw as JSON: messages, those that came late, the largest steps of
@@ -46,6 +48,8 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 from arm import Arm  # noqa: E402  (its folder is named above)
 
 CYCLE = 0.002
+# Of a message of positions in mid-motion. [s]
+LATE = 0.1
 
 
 def between(a, b, now):
@@ -72,12 +76,14 @@ def between(a, b, now):
 class Controller(Arm):
     """What it aims at, and the arm behind it."""
 
-    def __init__(self, names, start, turns, at_stamp):
-        self.names, self.turns, self.at_stamp = names, turns, at_stamp
+    def __init__(self, names, start, turns, at_stamp, period):
+        self.names, self.turns, self.at_stamp, self.period = names, turns, at_stamp, period
         self.lock = threading.Lock()
         super().__init__(start)
         self.active, self.powered, self.lose = True, True, 0
         self.number = None
+        # When positions last came, and the longest time between two in mid-motion.
+        self.placed, self.longest = 0.0, 0.0
         self.hold(list(start))
 
     def hold(self, q):
@@ -125,19 +131,23 @@ class Controller(Arm):
             return None, "it ends in the past"
         return points, start
 
+    def count(self, label):
+        """How many messages on from the last one this one is: the bridge numbers what it sends."""
+        number, before = int(label.split()[-1]), self.number
+        self.seen["messages"] += 1
+        self.number = number
+        # Another bridge counts from 1 again.
+        on = 1 if before is None or number <= before else number - before
+        self.seen["lost"] += on - 1
+        return on
+
     def take(self, message):
         now = time.time()
         with self.lock:
-            self.seen["messages"] += 1
-            # The bridge numbers what it sends.
-            number = int(message.header.frame_id.split()[-1])
+            self.count(message.header.frame_id)
             if self.lose > 0:
                 self.lose -= 1
-                self.number = number
                 return
-            if self.number is not None and number > self.number + 1:
-                self.seen["lost"] += number - self.number - 1
-            self.number = number
             if not self.works():
                 return
             points, start = self.wanted(message, now)
@@ -158,11 +168,22 @@ class Controller(Arm):
             kept = [p for p in self.points if p[0] < at] or self.points[:1]
             self.points = kept[-200:] + [(at, q, v)] + [p for p in points if p[0] > at]
 
-    def place(self, q):
+    def place(self, message):
+        now = time.time()
         with self.lock:
-            self.seen["messages"] += 1
-            if self.works() and len(q) == len(self.names):
-                self.hold(list(q))
+            on = self.count(message.layout.dim[0].label)
+            q = list(message.data)
+            if not self.works() or len(q) != len(self.names):
+                return
+            # Positions alone: their velocity is what they show.
+            v = [(a - b) / (on * self.period) for a, b in zip(q, self.last[0])]
+            gap = now - self.placed
+            self.placed = now
+            if any(self.last[1]):
+                self.longest = max(self.longest, gap)
+                self.seen["late"] += gap > LATE
+            self.judge(q, v, on * self.period)
+            self.hold(q)
 
     def step(self, now, straight):
         """One cycle of the controller."""
@@ -172,8 +193,10 @@ class Controller(Arm):
                 return
             q, v = self.desired(now)
             if straight:
-                # Positions alone: their velocity is what they show.
-                v = [(a - b) / self.elapsed for a, b in zip(q, self.last[0])]
+                # A position, which is set: nothing is known of a velocity.
+                self.follow(q, [0.0] * len(q))
+                return
+            self.judge(q, v, self.elapsed)
             self.follow(q, v)
 
 
@@ -183,6 +206,8 @@ def main():
     parser.add_argument("--json", required=True, help="where what was seen is written")
     parser.add_argument("--controller", default="/arm_controller")
     parser.add_argument("--interface", choices=["trajectory", "position"], default="trajectory")
+    parser.add_argument("--period", type=float, default=0.002,
+                        help="time between two messages of positions [s]")
     parser.add_argument("--replace", choices=["arrival", "stamp"], default="arrival")
     parser.add_argument("--wrap", action="store_true", help="tell angles within ±π")
     parser.add_argument("--rename", action="append", default=[], metavar="URDF=ROS")
@@ -194,7 +219,7 @@ def main():
     start = plan["knots"][0]["q"][: len(names)]
     held = [(renamed.get(j["name"], j["name"]), j["position"]) for j in plan["held"]]
     turns = ["roll_joint" in name and "upper" not in name for name in plan["joints"]]
-    arm = Controller(names, start, turns, args.replace == "stamp")
+    arm = Controller(names, start, turns, args.replace == "stamp", args.period)
     state = {"mute": False, "age": 0.0}
 
     try:
@@ -223,7 +248,7 @@ def main():
     node.create_service(SetBool, "/power", on_power)
     if args.interface == "position":
         subscription = node.create_subscription(
-            Float64MultiArray, args.controller + "/commands", lambda m: arm.place(m.data), 1)
+            Float64MultiArray, args.controller + "/commands", arm.place, 10)
     else:
         subscription = node.create_subscription(
             JointTrajectory, args.controller + "/joint_trajectory", arm.take, 10)
@@ -290,6 +315,8 @@ def main():
                 states.publish(message)
             measured.append([now - began] + list(arm.measured) + list(arm.last[0]))
     spinner.join()
+    if args.interface == "position":
+        print(f"longest time between two positions in mid-motion: {1e3 * arm.longest:.1f} ms", flush=True)
     with open(args.json, "w") as file:
         json.dump({"seen": arm.seen, "joints": names, "measured": measured}, file)
     node.destroy_node()

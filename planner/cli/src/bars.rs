@@ -1,22 +1,28 @@
 //! Progress bars.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use nullsweep_planner::progress::Progress;
 
 use crate::output::complain;
 
-/// Shows each stage's progress on standard error, if that is a terminal.
+/// Shows each stage's progress on standard error, if that is a terminal; or tells it a listener.
 pub(super) struct Bars {
     bar: Mutex<ProgressBar>,
+    listener: Option<Arc<dyn Progress + Send>>,
     /// Notes that were told.
     told: Mutex<Vec<String>>,
 }
 
 impl Bars {
     pub(super) fn new() -> Self {
-        Self { bar: Mutex::new(ProgressBar::hidden()), told: Mutex::default() }
+        Self { bar: Mutex::new(ProgressBar::hidden()), listener: None, told: Mutex::default() }
+    }
+
+    /// Nothing is shown: another one is told.
+    pub(super) fn of(listener: Arc<dyn Progress + Send>) -> Self {
+        Self { listener: Some(listener), ..Self::new() }
     }
 
     pub(super) fn clear(&self) {
@@ -32,6 +38,9 @@ impl Bars {
 
 impl Progress for Bars {
     fn stage(&self, name: &'static str, total: Option<usize>) {
+        if let Some(listener) = &self.listener {
+            return listener.stage(name, total);
+        }
         let (bar, template) = match total {
             Some(n) => (ProgressBar::new(n as u64), "{msg:<28} {wide_bar} {pos}/{len} {elapsed}"),
             None => (ProgressBar::new_spinner(), "{msg:<28} {spinner} {elapsed}"),
@@ -48,6 +57,9 @@ impl Progress for Bars {
     }
 
     fn tick(&self) {
+        if let Some(listener) = &self.listener {
+            return listener.tick();
+        }
         self.with(|bar| bar.inc(1));
     }
 
@@ -58,6 +70,9 @@ impl Progress for Bars {
                 return;
             }
             told.push(text.to_owned());
+        }
+        if let Some(listener) = &self.listener {
+            return listener.note(text);
         }
         self.with(|bar| bar.suspend(|| complain!("note: {text}")));
     }

@@ -74,6 +74,8 @@ choices! {
     FormatArg for Format {
         /// As `rostopic pub -f` reads it.
         RosYaml,
+        /// As `ros2 topic pub` takes it.
+        Ros2Yaml,
         /// A line a knot: time, positions, velocities, patch, whether the pad is on the surface.
         Csv,
         /// The message's fields by their names.

@@ -40,6 +40,15 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
     known.map(|(name, value)| [name.to_owned(), value]).collect()
 }
 
+/// The same for a page.
+pub(super) fn verified_table(v: &Verification) -> report::Table {
+    report::Table {
+        title: "Verified now".into(),
+        columns: vec!["figure".into(), "value".into()],
+        rows: verified_rows(v).into_iter().map(Vec::from).collect(),
+    }
+}
+
 /// What the arm was held against, for people.
 pub(super) fn held_against(a: &Against) -> String {
     let unseen = match a.unseen_points {

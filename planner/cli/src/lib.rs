@@ -2,6 +2,7 @@
 
 mod advice;
 mod bars;
+pub mod calls;
 mod cell;
 mod choices;
 mod exit;

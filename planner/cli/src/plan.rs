@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use anyhow::Context;
 use clap::Args;
+use nullsweep_collision::Options;
 use nullsweep_planner::link::Site;
 use nullsweep_planner::pipeline::{self, After, End, Job, Outcome, StanceChoice};
 use nullsweep_planner::plan::Plan;
@@ -13,7 +14,7 @@ use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::{Stance, StanceSearch};
-use nullsweep_report as report;
+use nullsweep_report::{self as report, ReportData};
 use nullsweep_robot::{Robot, Tool};
 use nullsweep_surface::PatchConfig;
 
@@ -197,9 +198,9 @@ impl FromStr for KnotOf {
 #[derive(Debug, Args)]
 pub(super) struct PlanCommandArgs {
     #[command(flatten)]
-    plan: PlanArgs,
+    pub(super) plan: PlanArgs,
     #[command(flatten)]
-    site: SiteArgs,
+    pub(super) site: SiteArgs,
 }
 
 pub(super) fn run(command: &PlanCommandArgs) -> anyhow::Result<u8> {
@@ -220,29 +221,51 @@ pub(super) fn make(
     site: Site<'_>,
     after: Option<After>,
 ) -> anyhow::Result<(u8, Plan)> {
-    let bars = Bars::new();
     for out in [Some(&args.out), args.json.as_ref(), args.report.as_ref()].into_iter().flatten() {
         writable(out)?;
     }
-    let robot = args.robot.robot()?;
-    args.robot.tell(&robot, &bars)?;
-    let job = job(args, &robot, site, after, &bars)?;
-    bars.stage("scan", None);
-    let scene = scene(&args.scene, args.demo, &args.scans, args.seed, &bars)?;
-    if job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
-        let hover = 1e3 * job.tool.hover();
-        bars.note(&format!(
-            "points up to {hover:.0} mm before the pad count as swept: its stand_off and reach_normal \
-             say so"
-        ));
-    }
-    let outcome = pipeline::run(&robot, &scene, &job, &bars);
-    bars.clear();
-    let outcome = outcome?;
-    Ok((finish(args, &robot, &scene, &outcome)?, outcome.plan))
+    let made = args.work(site, after, &Bars::new())?;
+    Ok((finish(args, &made)?, made.outcome.plan))
+}
+
+/// What was made, and of what.
+pub(super) struct Made {
+    robot: Robot,
+    pub(super) scene: Scene,
+    collision: Options,
+    pub(super) outcome: Outcome,
 }
 
 impl PlanArgs {
+    /// Makes the plan.
+    pub(super) fn work(
+        &self,
+        site: Site<'_>,
+        after: Option<After>,
+        bars: &Bars,
+    ) -> anyhow::Result<Made> {
+        let robot = self.robot.robot()?;
+        self.robot.tell(&robot, bars)?;
+        let job = job(self, &robot, site, after, bars)?;
+        let scene = self.scene(bars)?;
+        if job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
+            let hover = 1e3 * job.tool.hover();
+            bars.note(&format!(
+                "points up to {hover:.0} mm before the pad count as swept: its stand_off and \
+                 reach_normal say so"
+            ));
+        }
+        let outcome = pipeline::run(&robot, &scene, &job, bars);
+        bars.clear();
+        Ok(Made { robot, scene, collision: job.collision, outcome: outcome? })
+    }
+
+    /// What is there, in the floor frame.
+    pub(super) fn scene(&self, bars: &Bars) -> anyhow::Result<Scene> {
+        bars.stage("scan", None);
+        scene(&self.scene, self.demo, &self.scans, self.seed, bars)
+    }
+
     /// Whether they say where the plan begins or where the robot stands.
     pub(super) fn is_placed(&self) -> bool {
         let stands = !matches!(self.base, Base::Auto) || self.torso.is_some();
@@ -250,20 +273,17 @@ impl PlanArgs {
     }
 }
 
-/// Writes what was asked for and prints the table.
-fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> anyhow::Result<u8> {
-    let figures = &outcome.figures;
-    let violations = &figures.verification.violations;
-    // The plan first: it is there whatever becomes of the rest.
-    let code = write_unless_broken(&outcome.plan, violations, &args.out)?;
-    if let Some(path) = &args.report {
+impl Made {
+    /// The page that shows it.
+    pub(super) fn page(&self) -> anyhow::Result<ReportData> {
+        let (outcome, figures) = (&self.outcome, &self.outcome.figures);
         let edges = outcome.graph.edges.iter();
-        let data = picture(Sitter {
+        picture(Sitter {
             plans: std::slice::from_ref(&outcome.plan),
-            robot,
+            robot: &self.robot,
             arm: &outcome.arm,
-            collision: &args.robot.collision(),
-            scene: Some(scene),
+            collision: &self.collision,
+            scene: Some(&self.scene),
             verification: Some(&figures.verification),
             left_out: &figures.left_out,
             flights: &[],
@@ -273,8 +293,18 @@ fn finish(args: &PlanArgs, robot: &Robot, scene: &Scene, outcome: &Outcome) -> a
                 lines: edges.map(|e| e.line.iter().map(|s| s.point).collect()).collect(),
                 shown: false,
             }],
-        })?;
-        report::write(path, &data)?;
+        })
+    }
+}
+
+/// Writes what was asked for and prints the table.
+fn finish(args: &PlanArgs, made: &Made) -> anyhow::Result<u8> {
+    let figures = &made.outcome.figures;
+    let violations = &figures.verification.violations;
+    // The plan first: it is there whatever becomes of the rest.
+    let code = write_unless_broken(&made.outcome.plan, violations, &args.out)?;
+    if let Some(path) = &args.report {
+        report::write(path, &made.page()?)?;
     }
     if let Some(path) = &args.json {
         write_json(figures, path)?;

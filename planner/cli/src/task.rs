@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use nalgebra::Isometry3;
-use nullsweep_collision::Obstacle;
+use nullsweep_collision::{Obstacle, Options};
+use nullsweep_planner::link::Site;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::task::{self, TaskConfig, TaskFigures, TaskOutcome, Tolerance};
 use nullsweep_planner::workcell::{Scene, Stance};
-use nullsweep_report as report;
+use nullsweep_report::{self as report, ReportData};
 use nullsweep_robot::{Arm, Robot, Tool};
 
 use crate::bars::Bars;
@@ -32,6 +33,24 @@ pub(super) struct TaskArgs {
     /// Poses of the tool in the robot's root frame: time,x,y,z,qx,qy,qz,qw a line, apart by commas or
     /// blanks, time optional; names in the first line decide which column is which.
     poses: PathBuf,
+    #[command(flatten)]
+    task: PoseArgs,
+    /// Where the plan is written.
+    #[arg(long, short, value_name = "FILE", default_value = "plan.json")]
+    out: PathBuf,
+    /// Write every figure of the run as JSON to a file, or `-`.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a page that shows the arm moving along the plan.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    site: SiteArgs,
+}
+
+/// How poses are met.
+#[derive(Debug, Args)]
+pub(super) struct PoseArgs {
     #[command(flatten)]
     robot: RobotArgs,
     /// The tool, a TOML file, whose contact frame meets the poses; without it the tip frame itself.
@@ -82,17 +101,6 @@ pub(super) struct TaskArgs {
     /// Seed of every random choice: the same seed gives the same plan.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Where the plan is written.
-    #[arg(long, short, value_name = "FILE", default_value = "plan.json")]
-    out: PathBuf,
-    /// Write every figure of the run as JSON to a file, or `-`.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Write a page that shows the arm moving along the plan.
-    #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
-    #[command(flatten)]
-    site: SiteArgs,
 }
 
 pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
@@ -100,39 +108,85 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
         writable(out)?;
     }
     let bars = Bars::new();
-    let robot = args.robot.robot()?;
-    args.robot.tell(&robot, &bars)?;
-    let task::Poses { poses, notes } = task::read(&args.poses)?;
-    for note in &notes {
-        bars.note(note);
-    }
-    let tool = args.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
-    let scene = args.scene(&poses, &tool, &bars)?;
-    let stance = args.stance();
-    let arm = stance.bind(&robot.arm(&args.robot.spec())?)?;
-    let start = |posture: &PostureArg| {
-        posture.resolve(&arm, &args.robot, args.site.site(), &bars).context("--start")
-    };
-    let config = TaskConfig {
-        arm: args.robot.spec(),
-        tool,
-        tolerance: args.tolerance,
-        start: args.start.as_ref().map(start).transpose()?,
-        stance,
-        profile: args.profile.into(),
-        collision: args.robot.collision(),
-        v_max: args.v_max,
-        rounds: args.rounds.max(1),
-        trials: args.trials.max(1),
-        seed: args.seed,
-    };
-    let outcome = task::run(&robot, &poses, &scene, &config, &bars);
-    bars.clear();
-    let outcome = outcome?;
-    args.finish(&robot, &arm, &scene, &outcome, &bars)
+    let made = args.task.work(task::read(&args.poses)?, args.site.site(), &bars)?;
+    args.finish(&made)
 }
 
-impl TaskArgs {
+/// What was made, and of what.
+pub(super) struct Made {
+    robot: Robot,
+    arm: Arm,
+    scene: Scene,
+    collision: Options,
+    pub(super) outcome: TaskOutcome,
+}
+
+impl Made {
+    /// The page that shows it.
+    pub(super) fn page(&self) -> anyhow::Result<ReportData> {
+        let outcome = &self.outcome;
+        picture(Sitter {
+            plans: std::slice::from_ref(&outcome.plan),
+            robot: &self.robot,
+            arm: &self.arm,
+            collision: &self.collision,
+            scene: Some(&self.scene),
+            verification: Some(&outcome.verification),
+            flights: &[],
+            left_out: &[],
+            tables: vec![report::Table {
+                title: "Figures".into(),
+                columns: vec!["figure".into(), "value".into()],
+                rows: rows(&outcome.figures).into_iter().map(Vec::from).collect(),
+            }],
+            lines: Vec::new(),
+        })
+    }
+}
+
+impl PoseArgs {
+    /// Makes the plan through some poses.
+    pub(super) fn work(
+        &self,
+        found: task::Poses,
+        site: Site<'_>,
+        bars: &Bars,
+    ) -> anyhow::Result<Made> {
+        let task::Poses { poses, notes } = found;
+        let robot = self.robot.robot()?;
+        self.robot.tell(&robot, bars)?;
+        for note in &notes {
+            bars.note(note);
+        }
+        let tool = self.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
+        let scene = self.scene(&poses, &tool, bars)?;
+        let stance = self.stance();
+        let arm = stance.bind(&robot.arm(&self.robot.spec())?)?;
+        let start = |posture: &PostureArg| {
+            posture.resolve(&arm, &self.robot, site, bars).context("--start")
+        };
+        let config = TaskConfig {
+            arm: self.robot.spec(),
+            tool,
+            tolerance: self.tolerance,
+            start: self.start.as_ref().map(start).transpose()?,
+            stance,
+            profile: self.profile.into(),
+            collision: self.robot.collision(),
+            v_max: self.v_max,
+            rounds: self.rounds.max(1),
+            trials: self.trials.max(1),
+            seed: self.seed,
+        };
+        let outcome = task::run(&robot, &poses, &scene, &config, bars);
+        bars.clear();
+        let outcome = outcome?;
+        for note in &outcome.figures.notes {
+            bars.note(note);
+        }
+        Ok(Made { robot, arm, scene, collision: config.collision, outcome })
+    }
+
     /// What is around the arm, in the floor frame: with nothing scanned the floor alone.
     fn scene(&self, poses: &[Isometry3<f64>], tool: &Tool, bars: &Bars) -> anyhow::Result<Scene> {
         if !self.scans.is_empty() {
@@ -153,39 +207,15 @@ impl TaskArgs {
     fn stance(&self) -> Stance {
         Stance { base: self.base.0, held: crate::numbers::held(&self.held, self.torso) }
     }
+}
 
+impl TaskArgs {
     /// Writes what was asked for and prints the table.
-    fn finish(
-        &self,
-        robot: &Robot,
-        arm: &Arm,
-        scene: &Scene,
-        outcome: &TaskOutcome,
-        bars: &Bars,
-    ) -> anyhow::Result<u8> {
-        let figures = &outcome.figures;
-        for note in &figures.notes {
-            bars.note(note);
-        }
-        let code = write_unless_broken(&outcome.plan, &outcome.verification.violations, &self.out)?;
+    fn finish(&self, made: &Made) -> anyhow::Result<u8> {
+        let (plan, figures) = (&made.outcome.plan, &made.outcome.figures);
+        let code = write_unless_broken(plan, &made.outcome.verification.violations, &self.out)?;
         if let Some(path) = &self.report {
-            let data = picture(Sitter {
-                plans: std::slice::from_ref(&outcome.plan),
-                robot,
-                arm,
-                collision: &self.robot.collision(),
-                scene: Some(scene),
-                verification: Some(&outcome.verification),
-                flights: &[],
-                left_out: &[],
-                tables: vec![report::Table {
-                    title: "Figures".into(),
-                    columns: vec!["figure".into(), "value".into()],
-                    rows: rows(figures).into_iter().map(Vec::from).collect(),
-                }],
-                lines: Vec::new(),
-            })?;
-            report::write(path, &data)?;
+            report::write(path, &made.page()?)?;
         }
         if let Some(path) = &self.json {
             write_json(figures, path)?;

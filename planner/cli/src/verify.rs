@@ -4,16 +4,20 @@ use std::path::PathBuf;
 
 use clap::Args;
 use nalgebra::Point3;
+use nullsweep_collision::Options;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::verify::{Given, verify};
+use nullsweep_planner::verify::{Given, Verification, verify};
 use nullsweep_planner::workcell::Scene;
+use nullsweep_report::ReportData;
+use nullsweep_robot::{ArmSpec, Robot};
 
 use crate::bars::Bars;
 use crate::exit::{OK, VIOLATIONS};
-use crate::figures::verified_rows;
+use crate::figures::{verified_rows, verified_table};
 use crate::json::write_json;
 use crate::output::{complain, say, writable};
+use crate::picture::{Sitter, picture};
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
 use crate::scene::{Demo, SceneArgs, scene};
@@ -23,6 +27,19 @@ use crate::sheet::sheet;
 pub(super) struct VerifyArgs {
     /// The plan file.
     plan: PathBuf,
+    #[command(flatten)]
+    against: AgainstArgs,
+    /// Where nothing is found wrong, write the plan here as verified, so that `publish` takes it.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the figures as JSON to a file, or `-`, instead of a table.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// What a plan is held against.
+#[derive(Debug, Args)]
+pub(super) struct AgainstArgs {
     /// The scan files that it was made for, given as they were to `plan`; none: nothing but the floor
     /// is there.
     scans: Vec<PathBuf>,
@@ -40,12 +57,6 @@ pub(super) struct VerifyArgs {
     /// Seed of the simulated scan, or of the points laid on a mesh; without it the plan's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Where nothing is found wrong, write the plan here as verified, so that `publish` takes it.
-    #[arg(long, short, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Write the figures as JSON to a file, or `-`, instead of a table.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
 }
 
 pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
@@ -54,27 +65,7 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     }
     let bars = Bars::new();
     let plan = Plan::read(&args.plan)?;
-    let robot = args.robot.robot()?;
-    let seed = args.seed.unwrap_or(plan.seed);
-    let mut scene = if let Some(file) = &args.scene_file {
-        let first = plan.surface.first().filter(|_| !plan.is_of_poses());
-        let swept = first.map(|s| plan.base_pose() * Point3::from(s.point));
-        let choice = swept.map_or_else(|| args.scene.clone(), |point| args.scene.or_at(point));
-        scene(&choice, None, std::slice::from_ref(file), seed, &bars)?
-    } else if args.demo.is_none() && args.scans.is_empty() {
-        Scene::empty()
-    } else {
-        scene(&args.scene, args.demo, &args.scans, seed, &bars)?
-    };
-    if plan.surface.is_empty() || plan.is_of_poses() {
-        scene = scene.in_the_way();
-    }
-    let (arm, collision) = (args.robot.spec(), args.robot.collision());
-    let given = Given { robot: &robot, arm: &arm, scene: &scene, collision: &collision };
-    bars.stage("verify", Some(plan.knots.len()));
-    let found = verify(&plan, given, &|| bars.tick());
-    bars.clear();
-    let found = found?;
+    let found = args.against.check(&plan, &bars)?.verification;
     match &args.json {
         Some(path) => write_json(&found, path)?,
         None => {
@@ -92,4 +83,63 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
         plan.sealed().write(out)?;
     }
     Ok(OK)
+}
+
+/// What was found, and of what.
+pub(super) struct Checked {
+    robot: Robot,
+    arm: ArmSpec,
+    collision: Options,
+    scene: Scene,
+    pub(super) verification: Verification,
+}
+
+impl AgainstArgs {
+    /// Checks a plan.
+    pub(super) fn check(&self, plan: &Plan, bars: &Bars) -> anyhow::Result<Checked> {
+        let robot = self.robot.robot()?;
+        let scene = self.scene(plan, bars)?;
+        let (arm, collision) = (self.robot.spec(), self.robot.collision());
+        let given = Given { robot: &robot, arm: &arm, scene: &scene, collision: &collision };
+        bars.stage("verify", Some(plan.knots.len()));
+        let found = verify(plan, given, &|| bars.tick());
+        bars.clear();
+        Ok(Checked { verification: found?, robot, arm, collision, scene })
+    }
+
+    /// What is there, in the floor frame.
+    fn scene(&self, plan: &Plan, bars: &Bars) -> anyhow::Result<Scene> {
+        let seed = self.seed.unwrap_or(plan.seed);
+        let found = if let Some(file) = &self.scene_file {
+            let first = plan.surface.first().filter(|_| !plan.is_of_poses());
+            let swept = first.map(|s| plan.base_pose() * Point3::from(s.point));
+            let choice = swept.map_or_else(|| self.scene.clone(), |point| self.scene.or_at(point));
+            scene(&choice, None, std::slice::from_ref(file), seed, bars)?
+        } else if self.demo.is_none() && self.scans.is_empty() {
+            Scene::empty()
+        } else {
+            scene(&self.scene, self.demo, &self.scans, seed, bars)?
+        };
+        let in_the_way = plan.surface.is_empty() || plan.is_of_poses();
+        Ok(if in_the_way { found.in_the_way() } else { found })
+    }
+}
+
+impl Checked {
+    /// The page that shows the plan with what was found.
+    pub(super) fn page(&self, plan: &Plan) -> anyhow::Result<ReportData> {
+        let held: Vec<_> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
+        picture(Sitter {
+            plans: std::slice::from_ref(plan),
+            robot: &self.robot,
+            arm: &self.robot.arm(&self.arm)?.with_held(&held)?,
+            collision: &self.collision,
+            scene: Some(&self.scene),
+            verification: Some(&self.verification),
+            left_out: &[],
+            flights: &[],
+            tables: vec![verified_table(&self.verification)],
+            lines: Vec::new(),
+        })
+    }
 }

@@ -7,15 +7,15 @@ use anyhow::{Context, bail};
 use clap::Args;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::verify::{Given, Verification, verify};
+use nullsweep_planner::verify::{Given, verify};
 use nullsweep_recording::Recording;
-use nullsweep_report::{self as report, ReportData, Table};
+use nullsweep_report::{self as report, ReportData};
 use nullsweep_robot::{Arm, Robot, Tool};
 use nullsweep_surface::room::Room;
 
 use crate::bars::Bars;
 use crate::exit::{OK, Usage};
-use crate::figures::verified_rows;
+use crate::figures::verified_table;
 use crate::output::{say, tell, writable};
 use crate::picture::{Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
@@ -145,7 +145,7 @@ fn of_plans(
         verification: verification.as_ref(),
         left_out: &[],
         flights: &flights,
-        tables: verification.as_ref().map(table).into_iter().collect(),
+        tables: verification.as_ref().map(verified_table).into_iter().collect(),
         lines: Vec::new(),
     })
 }
@@ -164,14 +164,6 @@ fn of_recording(args: &ViewArgs, file: &Path, bars: &Bars) -> anyhow::Result<Rep
 fn flight(file: &Path, arm: &Arm, tool: &Tool, plans: &[Plan]) -> anyhow::Result<Flight> {
     let recording = Recording::read(file)?;
     Flight::of(&recording, arm, tool, plans).with_context(|| file.display().to_string())
-}
-
-fn table(found: &Verification) -> Table {
-    Table {
-        title: "Verified now".into(),
-        columns: vec!["figure".into(), "value".into()],
-        rows: verified_rows(found).into_iter().map(Vec::from).collect(),
-    }
 }
 
 /// The arm that the plan is for, its held joints where the plan holds them.

@@ -12,6 +12,8 @@ use super::file::Plan;
 pub enum Format {
     /// As `rostopic pub -f` reads it.
     RosYaml,
+    /// As `ros2 topic pub` takes it.
+    Ros2Yaml,
     /// A line a knot: time, positions, velocities, patch, whether the pad is on the surface.
     Csv,
     /// The message's fields by their names.
@@ -92,7 +94,8 @@ pub fn trajectory(plan: &Plan) -> JointTrajectory {
 /// What the writer says.
 pub fn write(plan: &Plan, format: Format, out: &mut impl Write) -> io::Result<()> {
     match format {
-        Format::RosYaml => yaml(&trajectory(plan), out),
+        Format::RosYaml => yaml(&trajectory(plan), ["seq: 0, ", "secs", "nsecs"], out),
+        Format::Ros2Yaml => yaml(&trajectory(plan), ["", "sec", "nanosec"], out),
         Format::Csv => csv(plan, out),
         Format::Json => {
             serde_json::to_writer_pretty(&mut *out, &trajectory(plan))?;
@@ -101,8 +104,13 @@ pub fn write(plan: &Plan, format: Format, out: &mut impl Write) -> io::Result<()
     }
 }
 
-fn yaml(trajectory: &JointTrajectory, out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "header: {{seq: 0, stamp: {{secs: 0, nsecs: 0}}, frame_id: ''}}")?;
+/// By what a version of ROS has in a header before its stamp, and calls the parts of a time.
+fn yaml(
+    trajectory: &JointTrajectory,
+    [before, whole, rest]: [&str; 3],
+    out: &mut impl Write,
+) -> io::Result<()> {
+    writeln!(out, "header: {{{before}stamp: {{{whole}: 0, {rest}: 0}}, frame_id: ''}}")?;
     writeln!(out, "joint_names: [{}]", trajectory.joint_names.join(", "))?;
     writeln!(out, "points:")?;
     for point in &trajectory.points {
@@ -111,7 +119,7 @@ fn yaml(trajectory: &JointTrajectory, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "  velocities: [{}]", list(&point.velocities))?;
         writeln!(out, "  accelerations: []")?;
         writeln!(out, "  effort: []")?;
-        writeln!(out, "  time_from_start: {{secs: {secs}, nsecs: {nsecs}}}")?;
+        writeln!(out, "  time_from_start: {{{whole}: {secs}, {rest}: {nsecs}}}")?;
     }
     Ok(())
 }

@@ -24,7 +24,7 @@ pub(crate) fn run(bytes: &[u8]) -> bool {
     let Ok(plan) = Plan::parse(text, Path::new("plan.json")) else { return false };
     let again = serde_json::to_string(&plan).expect("a plan can be written");
     assert_eq!(Plan::parse(&again, Path::new("again.json")).expect("what was written"), plan);
-    for format in [Format::RosYaml, Format::Csv, Format::Json] {
+    for format in [Format::RosYaml, Format::Ros2Yaml, Format::Csv, Format::Json] {
         write(&plan, format, &mut io::sink()).expect("a sink takes all");
     }
     let sealed = plan.message_parts().is_ok();

@@ -77,6 +77,19 @@ pub(crate) const CRATES: &[Crate] = &[
     with("fuzz", &["tests/inputs"]),
     with("pr2-bridge", &["ipc-types", "robot", "robot/cell", "executor", "bridge"]),
     with("ros2-bridge", &["ipc-types", "robot", "robot/cell", "executor", "bridge"]),
+    // The planner's commands as Python's functions; of the executor it knows the wire alone.
+    with(
+        "python",
+        &[
+            "planner",
+            "planner/cli",
+            "planner/gtsp",
+            "planner/report",
+            "robot",
+            "robot/cell",
+            "ipc-types",
+        ],
+    ),
 ];
 
 /// Crates that share the wire and nothing else: no way may lead from one to the other.
