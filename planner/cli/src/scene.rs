@@ -101,7 +101,7 @@ pub(super) fn scene(
     if demo.is_some() && args.placed.support_height > 0.0 {
         bars.note("a simulated scene stands on the floor: there is no table under it");
     } else if args.placed.support_height > 0.0 {
-        scene.obstacles.push(table::under(
+        scene.obstacles.extend(table::under(
             &scene.surface,
             args.placed.support_height,
             args.table,
