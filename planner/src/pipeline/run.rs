@@ -133,6 +133,7 @@ pub fn run(
         fill_in_patches: patches.len() - found.len() - strokes,
         strokes,
         base: stance.base,
+        base_height_m: stance.height,
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,

@@ -9,7 +9,6 @@ use super::error::PipelineError;
 use super::job::{Job, StanceChoice};
 use super::left_out::{Known, in_words, left_out};
 use super::start::start;
-use crate::progress::Silent;
 use crate::roadmap::{GraphConfig, Nodes, graph};
 use crate::workcell::stance::{self, Stance, StanceSearch};
 use crate::workcell::{Bed, Sample, Scene, Workcell, reach};
@@ -124,13 +123,16 @@ fn best_of(open: &[Open], job: &Job) -> Option<usize> {
     order.sort_by_key(|&i| std::cmp::Reverse(open[i].most));
     let mut best: Option<(usize, usize)> = None;
     for batch in order.chunks(SIDE_BY_SIDE) {
-        if best.is_some_and(|(score, _)| open[batch[0]].most <= score) {
+        let beat = best.map(|(score, _)| score);
+        if beat.is_some_and(|score| open[batch[0]].most <= score) {
             break;
         }
-        let scores: Vec<usize> =
-            batch.par_iter().map(|&i| open[i].setting.score(job, &open[i].reached)).collect();
+        let score = |&i: &usize| open[i].setting.score(job, &open[i].reached, beat);
+        let scores: Vec<Option<usize>> = batch.par_iter().map(score).collect();
         for (score, &i) in scores.into_iter().zip(batch) {
-            if best.is_none_or(|(s, _)| score > s) {
+            if let Some(score) = score
+                && best.is_none_or(|(s, _)| score > s)
+            {
                 best = Some((score, i));
             }
         }
@@ -198,16 +200,19 @@ impl Setting {
     }
 
     /// Points of reached patches, each weighed by the edges that lead on from its patch, up to
-    /// `WELL_JOINED`.
-    fn score(&self, job: &Job, reached: &[Option<Sample>]) -> usize {
+    /// `WELL_JOINED`; `None` if that is no more than what is to be beaten.
+    fn score(&self, job: &Job, reached: &[Option<Sample>], beat: Option<usize>) -> Option<usize> {
         let bed = Bed::new(&self.scene, &job.tool);
         let config = GraphConfig { edge_samples: 24, ..job.graph };
         let nodes = Nodes { bed: &bed, patches: &self.patches, reached };
-        let graph = graph::build(self.cell(job), nodes, &config, None, &Silent);
-        (0..self.patches.len())
-            .filter(|&i| reached[i].is_some())
-            .map(|i| self.patches[i].points.len() * (1 + graph.incident[i].len().min(WELL_JOINED)))
-            .sum()
+        let weighed = |edges: &[usize]| -> usize {
+            let patches = self.patches.iter().zip(reached).zip(edges);
+            let reached = patches.filter(|((_, reached), _)| reached.is_some());
+            reached.map(|((patch, _), edges)| patch.points.len() * (1 + edges)).sum()
+        };
+        let is_hopeless = |most: &[usize]| beat.is_some_and(|beat| weighed(most) <= beat);
+        let edges = graph::joined(self.cell(job), nodes, &config, WELL_JOINED, is_hopeless)?;
+        Some(weighed(&edges))
     }
 }
 

@@ -17,6 +17,9 @@ use super::scene::Scene;
 pub struct Stance {
     /// x, y \[m\] and yaw \[rad\] of the root frame in the floor frame.
     pub base: [f64; 3],
+    /// How high above the floor the root frame is: a stand's height. \[m\]
+    #[serde(default)]
+    pub height: f64,
     /// Held joints by name, for instance the torso's height. \[rad\] or \[m\]
     pub held: Vec<(String, f64)>,
 }
@@ -26,7 +29,7 @@ impl Stance {
     #[must_use]
     pub fn pose(&self) -> Isometry3<f64> {
         let [x, y, yaw] = self.base;
-        Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * yaw)
+        Isometry3::new(Vector3::new(x, y, self.height), Vector3::z() * yaw)
     }
 
     /// The arm with this stance's held joints.
@@ -170,7 +173,7 @@ pub fn candidates(
         None => vec![search.held.clone()],
     };
     for held in heights {
-        let bound = Stance { base: [0.0; 3], held: held.clone() }.bind(arm)?;
+        let bound = Stance { base: [0.0; 3], height: 0.0, held: held.clone() }.bind(arm)?;
         let body = body_boxes(robot, &bound);
         for &distance in &search.distances {
             for b in 0..search.bearings {
@@ -184,7 +187,7 @@ pub fn candidates(
                         wrap(turn),
                     ];
                     stances.push((
-                        Stance { base, held: held.clone() },
+                        Stance { base, height: 0.0, held: held.clone() },
                         bound.clone(),
                         body.clone(),
                     ));
@@ -200,7 +203,7 @@ pub fn candidates(
         .par_iter()
         .filter_map(|(stance, arm, body)| {
             let from_floor = stance.pose().inverse();
-            if sparse.iter().any(|p| hits(body, &(from_floor * p))) {
+            if in_the_way(stance, body, &sparse) {
                 return None;
             }
             let reached: usize = judged
@@ -292,6 +295,24 @@ fn extent(link: &Isometry3<f64>, shape: &CollisionShape) -> Option<(Point3<f64>,
     let reach = rotation.matrix().abs() * half + Vector3::repeat(BODY_SPACE);
     let middle = Point3::from(pose.translation.vector);
     Some((middle - reach, middle + reach))
+}
+
+/// Whether one of the points is where the standing body would be.
+fn in_the_way(
+    stance: &Stance,
+    body: &[(Point3<f64>, Point3<f64>)],
+    points: &[Point3<f64>],
+) -> bool {
+    // No turn takes the body out of this circle.
+    let corner = |(low, high): &(Point3<f64>, Point3<f64>)| {
+        let [x, y] = [0, 1].map(|i| low[i].abs().max(high[i].abs()));
+        x * x + y * y
+    };
+    let reach = body.iter().map(corner).fold(0.0, f64::max);
+    let from_floor = stance.pose().inverse();
+    let [x, y, _] = stance.base;
+    let near = |p: &&Point3<f64>| (p.x - x).powi(2) + (p.y - y).powi(2) <= reach;
+    points.iter().filter(near).any(|p| hits(body, &(from_floor * p)))
 }
 
 fn hits(boxes: &[(Point3<f64>, Point3<f64>)], p: &Point3<f64>) -> bool {

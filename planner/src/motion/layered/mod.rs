@@ -78,6 +78,10 @@ pub trait Moves: Sync {
     /// Whether the tool can be lifted off at a sample: without that no jump begins or ends there.
     fn lifts(&self, at: &Sample) -> bool;
 
+    /// Whether two samples of a layer are so near each other in all but how the pad is turned that what
+    /// keeps a jump from one keeps it from the other.
+    fn are_alike(&self, a: &Sample, b: &Sample) -> bool;
+
     /// An estimate of a jump's cost from that of its straight joint line, not above the truth.
     fn jump_estimate(&self, straight: f64) -> f64;
 }
@@ -235,11 +239,20 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
     fn strike(&mut self, p: usize, key: &Key) -> bool {
         let from = key.from.is_none_or(|from| self.lifts(from));
         let to = self.lifts(key.to);
+        let Problem { layers, moves, .. } = self.problem;
+        let alike = |(layer, sample): (usize, usize)| -> Vec<bool> {
+            let failed = &layers[layer][sample];
+            layers[layer].iter().map(|other| moves.are_alike(failed, other)).collect()
+        };
+        let (alike_from, alike_to) = (key.from.map(alike), alike(key.to));
         let off = |layer: Option<usize>| layer.and_then(|layer| self.lifts[layer].as_ref());
         let (rows, columns) = (off(key.from.map(|(layer, _)| layer)), off(Some(key.to.0)));
         let edges = &mut self.into[p];
         edges.close_jumps(|row, column| {
-            rows.is_some_and(|lifts| !lifts[row]) || columns.is_some_and(|lifts| !lifts[column])
+            let is_alike = alike_to[column] && alike_from.as_ref().is_none_or(|alike| alike[row]);
+            is_alike
+                || rows.is_some_and(|lifts| !lifts[row])
+                || columns.is_some_and(|lifts| !lifts[column])
         });
         edges.strike(from && to)
     }
