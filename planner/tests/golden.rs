@@ -226,7 +226,11 @@ fn another_arm_is_planned_as_ever() {
         let job = Job {
             arm: ArmSpec { base: "panda_link0".into(), tip: "panda_link8".into() },
             tool: toml::from_str(&tool).expect("a tool"),
-            stance: StanceChoice::Given(Stance { base: [-0.5, 0.0, 0.0], height: 0.0, held: Vec::new() }),
+            stance: StanceChoice::Given(Stance {
+                base: [-0.5, 0.0, 0.0],
+                height: 0.0,
+                held: Vec::new(),
+            }),
             collision: Options { fit_capsules: Some(0.05), ..Options::default() },
             refinements: 0,
             ..job([0.0; 3], 0.0)

@@ -151,7 +151,7 @@ impl TaskArgs {
     }
 
     fn stance(&self) -> Stance {
-        Stance { base: self.base.0, held: crate::numbers::held(&self.held, self.torso) }
+        self.base.stance(crate::numbers::held(&self.held, self.torso))
     }
 
     /// Writes what was asked for and prints the table.

@@ -3,7 +3,7 @@
 use nullsweep_robot::JointVector;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-use super::jump::jump;
+use super::jump::{is_joined, jump};
 use super::layered::{Link, Motion, Moves};
 use super::leg::Leg;
 use super::memo::{How, Key, Memo};
@@ -156,6 +156,12 @@ impl<C: Cost> Moves for Mover<'_, C> {
 
     fn lifts(&self, at: &Sample) -> bool {
         lift(self.cell, &at.q).is_some()
+    }
+
+    fn is_joined(&self, at: &Sample) -> bool {
+        self.memo.joined.get(Key::new(How::Start, &self.source, at), || {
+            is_joined(self.cell, &self.source, &at.q, self.seed_of(&self.source, &at.q))
+        })
     }
 
     fn are_alike(&self, a: &Sample, b: &Sample) -> bool {

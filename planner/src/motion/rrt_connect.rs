@@ -14,7 +14,7 @@ pub struct Options {
     pub samples: usize,
     /// Longest segment of a tree, Euclidean over the joints. \[rad\]
     pub step: f64,
-    /// Shortcuts tried on the path found.
+    /// Shortcuts tried on the path found; 0 leaves it as it is.
     pub shortcuts: usize,
 }
 
@@ -86,7 +86,9 @@ pub fn rrt_connect(
                 if growing == 1 {
                     path.reverse();
                 }
-                shortcut(&mut path, options.shortcuts, &mut rng, free);
+                if options.shortcuts > 0 {
+                    shortcut(&mut path, options.shortcuts, &mut rng, free);
+                }
                 return Some(path);
             }
         }

@@ -133,7 +133,8 @@ fn a_motion_is_the_same_whether_it_was_asked_for_before_or_not() {
         .collect();
     let outward = UnitVector3::new_normalize(-Vector3::x());
     let normals = vec![outward; points.len()];
-    let bed = Bed::soft(Surface::new(&Scan { raw: points.clone(), points, normals, spacing: 0.01 }));
+    let bed =
+        Bed::soft(Surface::new(&Scan { raw: points.clone(), points, normals, spacing: 0.01 }));
     // Beside the post, the pad meets it at some headings and redundancy values and not at others.
     let patches: Vec<Patch> = [-0.36, -0.29]
         .map(|y| Patch {

@@ -5,6 +5,7 @@ use nullsweep_robot::{Arm, Robot};
 use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
+use super::elsewhere::Other;
 use super::error::PipelineError;
 use super::job::{Job, StanceChoice};
 use super::left_out::{Known, in_words, left_out};
@@ -20,6 +21,8 @@ pub(super) struct Setting {
     pub(super) scene: Scene,
     pub(super) patches: Vec<Patch>,
     pub(super) world: World,
+    /// The other stances of a search that reach something, what promises most first.
+    pub(super) others: Vec<Other>,
 }
 
 /// Puts the robot where it is asked to stand, or where it reaches most.
@@ -77,7 +80,7 @@ fn search(
         }
         let setting = Setting::new(robot, arm, scene, patches, job, setting.stance)?;
         match setting.stands(job) {
-            Some(Stands::Ready) => return Ok(setting),
+            Some(Stands::Ready) => return Ok(setting.beside(open)),
             Some(Stands::Makeshift) if makeshift.is_none() => makeshift = Some(setting),
             _ => {}
         }
@@ -86,7 +89,7 @@ fn search(
         }
     }
     if let Some(setting) = makeshift {
-        return Ok(setting);
+        return Ok(setting.beside(open));
     }
     let why = match first {
         None => {
@@ -141,7 +144,7 @@ fn best_of(open: &[Open], job: &Job) -> Option<usize> {
 }
 
 impl Setting {
-    fn new(
+    pub(super) fn new(
         robot: &Robot,
         arm: &Arm,
         scene: &Scene,
@@ -155,10 +158,20 @@ impl Setting {
         let scene = scene.transformed(&to_root);
         let (points, obstacles) = (scene.points(), &scene.obstacles);
         let world = World::new(robot, &arm, &job.tool, points, obstacles, &job.collision)?;
-        Ok(Self { stance, arm, scene, patches, world })
+        Ok(Self { stance, arm, scene, patches, world, others: Vec::new() })
     }
 
-    fn cell<'a>(&'a self, job: &'a Job) -> Workcell<'a> {
+    /// It beside the others that were open to choice.
+    fn beside(self, mut open: Vec<Open>) -> Self {
+        open.sort_by_key(|other| std::cmp::Reverse(other.most));
+        let other = |open: Open| {
+            let reached = open.reached.iter().map(Option::is_some).collect();
+            Other { stance: open.setting.stance, reached }
+        };
+        Self { others: open.into_iter().map(other).collect(), ..self }
+    }
+
+    pub(super) fn cell<'a>(&'a self, job: &'a Job) -> Workcell<'a> {
         Workcell { arm: &self.arm, tool: &job.tool, world: &self.world }
     }
 
@@ -169,6 +182,11 @@ impl Setting {
         }
         let start = start(job, &self.arm, &self.world).ok()?;
         Some(if start.is_makeshift { Stands::Makeshift } else { Stands::Ready })
+    }
+
+    /// Whether body and arm have a place here.
+    pub(super) fn can_stand(&self, job: &Job) -> bool {
+        self.stands(job).is_some()
     }
 
     /// What keeps the arm from everything.

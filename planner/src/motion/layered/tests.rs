@@ -49,6 +49,9 @@ impl Moves for Hidden {
     fn lifts(&self, _: &Sample) -> bool {
         true
     }
+    fn is_joined(&self, _: &Sample) -> bool {
+        true
+    }
     fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
         a == b
     }
@@ -174,6 +177,9 @@ impl Moves for Gates {
     fn lifts(&self, _: &Sample) -> bool {
         true
     }
+    fn is_joined(&self, _: &Sample) -> bool {
+        true
+    }
     fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
         a == b
     }
@@ -242,6 +248,9 @@ impl Moves for Trap {
     fn lifts(&self, at: &Sample) -> bool {
         at.heading != 1.0
     }
+    fn is_joined(&self, _: &Sample) -> bool {
+        true
+    }
     fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
         a == b
     }
@@ -292,6 +301,9 @@ impl Moves for Wall {
         Some(Motion { cost: straight(&from.q, &to.q), path: () })
     }
     fn lifts(&self, _: &Sample) -> bool {
+        true
+    }
+    fn is_joined(&self, _: &Sample) -> bool {
         true
     }
     fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
