@@ -108,6 +108,7 @@ pub(super) fn run(args: &TaskArgs) -> anyhow::Result<u8> {
     }
     let tool = args.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
     let scene = args.scene(&poses, &tool, &bars)?;
+    args.base.tell(&bars);
     let stance = args.stance();
     let arm = stance.bind(&robot.arm(&args.robot.spec())?)?;
     let start = |posture: &PostureArg| {

@@ -125,6 +125,7 @@ fn best_of(open: &[Open], job: &Job) -> Option<usize> {
     let mut order: Vec<usize> = (0..open.len()).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(open[i].most));
     let mut best: Option<(usize, usize)> = None;
+    order.truncate(SCORED);
     for batch in order.chunks(SIDE_BY_SIDE) {
         let beat = best.map(|(score, _)| score);
         if beat.is_some_and(|score| open[batch[0]].most <= score) {
@@ -221,7 +222,7 @@ impl Setting {
     /// `WELL_JOINED`; `None` if that is no more than what is to be beaten.
     fn score(&self, job: &Job, reached: &[Option<Sample>], beat: Option<usize>) -> Option<usize> {
         let bed = Bed::new(&self.scene, &job.tool);
-        let config = GraphConfig { edge_samples: 24, ..job.graph };
+        let config = GraphConfig { edge_samples: EDGE_SAMPLES, ..job.graph };
         let nodes = Nodes { bed: &bed, patches: &self.patches, reached };
         let weighed = |edges: &[usize]| -> usize {
             let patches = self.patches.iter().zip(reached).zip(edges);
@@ -236,5 +237,9 @@ impl Setting {
 
 /// Edges from a patch from which on a stance gains nothing by more of them.
 const WELL_JOINED: usize = 4;
+/// Redundancy values by which an edge is looked for where stances are compared.
+const EDGE_SAMPLES: usize = 12;
+/// Stances that are scored at most, those that promise most.
+const SCORED: usize = 12;
 /// Stances that are scored side by side.
 const SIDE_BY_SIDE: usize = 4;

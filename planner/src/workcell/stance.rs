@@ -318,3 +318,53 @@ fn in_the_way(
 fn hits(boxes: &[(Point3<f64>, Point3<f64>)], p: &Point3<f64>) -> bool {
     boxes.iter().any(|(low, high)| (0..3).all(|i| (low[i]..=high[i]).contains(&p[i])))
 }
+
+#[cfg(test)]
+mod tests {
+    use nullsweep_robot::{ArmSpec, Side};
+
+    use super::*;
+
+    #[test]
+    fn the_body_is_all_that_stands_still_and_the_first_link_that_turns_in_place() {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&ArmSpec::pr2(Side::Right)).unwrap();
+        let body = body_boxes(&robot, &arm);
+        let mut poses = vec![Isometry3::identity(); robot.links().len()];
+        arm.link_poses(&arm.home(), &mut poses);
+        // The middle of every shape of a link.
+        let middles = |link: usize| {
+            let shapes = robot.links()[link].collisions.iter();
+            shapes.map(|shape| poses[link] * shape.origin * Point3::origin()).collect::<Vec<_>>()
+        };
+        let first = arm.moving_links()[0];
+        assert!(!middles(first).is_empty());
+        assert!(middles(first).iter().all(|p| hits(&body, p)), "the first link has no place");
+        let last = arm.moving_links().last().copied().unwrap();
+        assert!(!middles(last).is_empty());
+        assert!(middles(last).iter().all(|p| !hits(&body, p)), "the hand is no body");
+
+        // A point in the first link is in the way of that stance, wherever it stands and turns.
+        for turn in 0..12 {
+            let yaw = 0.55 * f64::from(turn);
+            let stance = Stance { base: [1.3, -0.4, yaw], height: 0.1, held: Vec::new() };
+            let there: Vec<Point3<f64>> =
+                middles(first).iter().map(|p| stance.pose() * p).collect();
+            assert!(in_the_way(&stance, &body, &there));
+            let above: Vec<_> = there.iter().map(|p| p + Vector3::z() * 3.0).collect();
+            assert!(!in_the_way(&stance, &body, &above));
+        }
+        // Whether points are in the way is told as if all of them were looked at.
+        let mut found = 0;
+        for n in 0..4000 {
+            let f = |a: f64| (f64::from(n) * a).fract();
+            let p =
+                Point3::new(3.0 * f(0.819_173) - 1.5, 3.0 * f(0.671_043) - 1.5, 2.0 * f(0.5497));
+            let stance = Stance { base: [0.2, 0.1, 6.0 * f(0.73)], height: 0.0, held: Vec::new() };
+            let wanted = hits(&body, &(stance.pose().inverse() * p));
+            assert_eq!(in_the_way(&stance, &body, &[p]), wanted, "{p}");
+            found += usize::from(wanted);
+        }
+        assert!(found > 100, "{found}");
+    }
+}
