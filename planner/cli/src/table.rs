@@ -25,6 +25,9 @@ const TOP_SHARE: f64 = 0.25;
 /// How far below the points of a swept top the solid plate begins: more than a pad is pressed in and
 /// the arm keeps from it, as deep as something may come behind what was measured. [m]
 const BELOW: f64 = 0.02;
+/// The same beside what was measured, where no points keep the arm off the top: no more than a pad
+/// that hangs over is pressed in, and keeps from a solid thing. [m]
+const BESIDE: f64 = 0.01;
 
 /// Length and width of a table top. [m]
 #[derive(Clone, Copy, Debug)]
@@ -70,12 +73,12 @@ pub(super) fn under(
     }
     let Some(lowest) = swept_top(scan, height) else { return vec![plate(low, high, height)] };
     let below = lowest - BELOW;
+    let beside = lowest - BESIDE;
     bars.note(&format!(
         "what is swept is the table's top: its points stand for it, and what is solid below them \
-         begins at {below:.3} m"
+         begins at {below:.3} m, beside them at {beside:.3} m"
     ));
     let [from, to] = seen;
-    // Beside what was measured the top is where it was said to be.
     let rim = [
         (low, [from[0], high[1]]),
         ([to[0], low[1]], high),
@@ -83,7 +86,7 @@ pub(super) fn under(
         ([from[0], to[1]], [to[0], high[1]]),
     ];
     let rim = rim.into_iter().filter(|(low, high)| (0..2).all(|axis| high[axis] > low[axis]));
-    let rim = rim.map(|(low, high)| plate(low, high, height));
+    let rim = rim.map(|(low, high)| plate(low, high, beside));
     std::iter::once(plate(low, high, below)).chain(rim).collect()
 }
 
@@ -125,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_lies_below_its_own_top_where_that_is_swept_and_as_high_as_it_was_said_beside_it() {
+    fn a_table_lies_below_its_own_top_where_that_is_swept_and_hardly_below_it_beside() {
         let mut points: Vec<Point3<f64>> = (0..400)
             .map(|i| {
                 let noise = 0.001 * f64::from(i % 7) - 0.003;
@@ -148,7 +151,9 @@ mod tests {
             assert!(inside(Point3::new(p.x, p.y, 0.66)), "the plate is under {p}");
         }
         for beside in [[-0.4, 0.2], [0.8, 0.2], [0.2, -0.4], [0.2, 0.8], [-0.4, -0.4]] {
-            assert!(inside(Point3::new(beside[0], beside[1], 0.699)), "{beside:?}");
+            assert!(inside(Point3::new(beside[0], beside[1], 0.686)), "{beside:?}");
+            // A pad that hangs over is pressed in by 4 mm and keeps 5 mm.
+            assert!(!inside(Point3::new(beside[0], beside[1], 0.697 - 0.0095)), "{beside:?}");
         }
     }
 
