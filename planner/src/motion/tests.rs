@@ -160,9 +160,9 @@ fn a_motion_is_the_same_whether_it_was_asked_for_before_or_not() {
     let (from, to) = (layer(0), layer(1));
     let stops = [0, 1];
     let source = arm.home();
-    let mover = |memo| Mover::new(cell, &graph, &stops, &Effort, source, memo);
-    let (kept, seed) = (Memo::new(5), 5);
-    let warm = mover(&kept);
+    let seed = 5;
+    let kept = Memo::new(seed);
+    let warm = Mover::new(cell, &graph, &stops, &Effort, source, &kept);
     let Link::Surface { edge, reversed } = warm.link(0, 1) else { panic!("an edge") };
     let (mut made, mut failed) = ([0; 3], [0; 3]);
     // What is asked for again comes after other motions.
@@ -170,7 +170,7 @@ fn a_motion_is_the_same_whether_it_was_asked_for_before_or_not() {
         let pairs = from.iter().flat_map(|a| to.iter().map(move |b| (a, b)));
         for (a, b) in pairs.step_by(5).take(40) {
             let fresh = Memo::new(seed);
-            let cold = mover(&fresh);
+            let cold = Mover::new(cell, &graph, &stops, &Effort, source, &fresh);
             let ways: [fn(&Mover<'_, Effort>, (usize, bool), &Sample, &Sample) -> _; 3] = [
                 |mover, link, a, b| mover.track(link, a, b).map_err(|b| format!("{b:?}")),
                 |mover, link, a, b| mover.around(link, a, b).ok_or_else(String::new),
@@ -183,8 +183,10 @@ fn a_motion_is_the_same_whether_it_was_asked_for_before_or_not() {
                 failed[kind] += usize::from(one.is_err());
             }
         }
-        let [one, other] = [&kept, &Memo::new(seed)].map(|memo| mover(memo).jump(None, &to[0]));
-        assert_eq!(one.map(told), other.map(told));
+        let fresh = Memo::new(seed);
+        let cold = Mover::new(cell, &graph, &stops, &Effort, source, &fresh);
+        let [one, other] = [&warm, &cold].map(|mover| mover.jump(None, &to[0]).map(told));
+        assert_eq!(one, other);
     }
     assert!(made.iter().all(|n| *n > 0) && failed[0] > 0, "{made:?} made, {failed:?} not");
 }
