@@ -116,6 +116,9 @@ fn no_way_is_a_result() {
     assert_eq!(rrt_connect(&world, &arm, &lift(-0.42), &lift(0.02), &options, 1), None);
 }
 
+/// Asks for a motion along an edge, or beside it.
+type Way = fn(&Mover<'_, Effort>, (usize, bool), &Sample, &Sample) -> Result<Motion<Leg>, String>;
+
 /// What there is to a motion, to the bit.
 fn told(motion: Motion<Leg>) -> (u64, Vec<JointVector>, Vec<Option<Point3<f64>>>) {
     (motion.cost.to_bits(), motion.path.joints, motion.path.line)
@@ -171,7 +174,7 @@ fn a_motion_is_the_same_whether_it_was_asked_for_before_or_not() {
         for (a, b) in pairs.step_by(5).take(40) {
             let fresh = Memo::new(seed);
             let cold = Mover::new(cell, &graph, &stops, &Effort, source, &fresh);
-            let ways: [fn(&Mover<'_, Effort>, (usize, bool), &Sample, &Sample) -> _; 3] = [
+            let ways: [Way; 3] = [
                 |mover, link, a, b| mover.track(link, a, b).map_err(|b| format!("{b:?}")),
                 |mover, link, a, b| mover.around(link, a, b).ok_or_else(String::new),
                 |mover, _, a, b| mover.jump(Some(a), b).ok_or_else(String::new),

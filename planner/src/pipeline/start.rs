@@ -111,7 +111,7 @@ mod tests {
             pose: Isometry3::from(arm.tip_pose(&arm.home()).translation),
             carries_robot: false,
         };
-        let (arm, world) = around(&[block.clone()], &job);
+        let (arm, world) = around(std::slice::from_ref(&block), &job);
         assert!(!world.is_free(&arm.home(), ToolContact::Forbidden));
         let Start { q, is_makeshift, note } = start(&job, &arm, &world).unwrap();
         assert!(is_makeshift && world.is_free(&q, ToolContact::Forbidden));
