@@ -340,8 +340,9 @@ mod tests {
         let first = arm.moving_links()[0];
         assert!(!middles(first).is_empty());
         assert!(middles(first).iter().all(|p| hits(&body, p)), "the first link has no place");
-        let last = arm.moving_links().last().copied().unwrap();
-        assert!(!middles(last).is_empty());
+        let shaped = |link: &&usize| !middles(**link).is_empty();
+        let last = *arm.moving_links().iter().rev().find(shaped).expect("a hand");
+        assert_ne!(last, first);
         assert!(middles(last).iter().all(|p| !hits(&body, p)), "the hand is no body");
 
         // A point in the first link is in the way of that stance, wherever it stands and turns.
