@@ -173,9 +173,9 @@ fn a_motion_is_the_same_whether_it_was_asked_for_before_or_not() {
         let pairs = from.iter().flat_map(|a| to.iter().map(move |b| (a, b)));
         // No track arrives beside a sample.
         let beside = |b: &Sample| Sample { q: b.q + JointVector::from_fn(|_| 0.05), ..*b };
-        let ends = |(a, b)| [(a, *b), (a, beside(b))];
+        let ends = |(a, b): (&Sample, &Sample)| [(*a, *b), (*a, beside(b))];
         for (a, b) in pairs.step_by(5).take(40).flat_map(ends) {
-            let b = &b;
+            let (a, b) = (&a, &b);
             let fresh = Memo::new(seed);
             let cold = Mover::new(cell, &graph, &stops, &Effort, source, &fresh);
             let ways: [Way; 3] = [
