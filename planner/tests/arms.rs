@@ -74,7 +74,7 @@ fn on_flange() -> Tool {
 fn plan(robot: &Robot, spec: &ArmSpec, tool: Tool, base: Option<[f64; 3]>) -> Outcome {
     let seat = common::seat();
     let stance = match base {
-        Some(base) => StanceChoice::Given(Stance { base, held: Vec::new() }),
+        Some(base) => StanceChoice::Given(Stance { base, height: 0.0, held: Vec::new() }),
         None => {
             let arm = robot.arm(spec).unwrap();
             let search = StanceSearch::of(robot, &arm, &tool);

@@ -20,6 +20,7 @@ fn plan(profile: Profile) -> Plan {
         held: Vec::new(),
         tool: Tool::default(),
         base: [0.0; 3],
+        base_height: 0.0,
         method: Method::Tsp,
         cost: CostKind::Time,
         profile,

@@ -21,7 +21,7 @@ fn seat() -> Scene {
 fn plan(smooth: bool, profile: Profile) -> Outcome {
     let held = vec![("torso_lift_joint".to_owned(), 0.2)];
     let job = Job {
-        stance: StanceChoice::Given(Stance { base: [-0.708, -0.004, 1.047], held }),
+        stance: StanceChoice::Given(Stance { base: [-0.708, -0.004, 1.047], height: 0.0, held }),
         ik_samples: 16,
         graph: GraphConfig { edge_samples: 24, ..GraphConfig::default() },
         refinements: 1,

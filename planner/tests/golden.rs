@@ -62,7 +62,7 @@ fn scene(view: &SimulatedView, part: Option<CropBox>) -> Scene {
 fn job(base: [f64; 3], torso: f64) -> Job {
     let held = vec![("torso_lift_joint".to_owned(), torso)];
     Job {
-        stance: StanceChoice::Given(Stance { base, held }),
+        stance: StanceChoice::Given(Stance { base, height: 0.0, held }),
         end: End::Contact,
         ik_samples: 16,
         graph: GraphConfig { edge_samples: 24, ..GraphConfig::default() },
@@ -185,7 +185,7 @@ fn given_poses_are_planned_as_ever() {
         arm: ArmSpec::pr2(Side::Right),
         tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
         tolerance: Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]),
-        stance: Stance { base: [0.0; 3], held: Vec::new() },
+        stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
         start: None,
         profile: Profile::Velocity,
         collision: Options::default(),
@@ -226,7 +226,11 @@ fn another_arm_is_planned_as_ever() {
         let job = Job {
             arm: ArmSpec { base: "panda_link0".into(), tip: "panda_link8".into() },
             tool: toml::from_str(&tool).expect("a tool"),
-            stance: StanceChoice::Given(Stance { base: [-0.5, 0.0, 0.0], held: Vec::new() }),
+            stance: StanceChoice::Given(Stance {
+                base: [-0.5, 0.0, 0.0],
+                height: 0.0,
+                held: Vec::new(),
+            }),
             collision: Options { fit_capsules: Some(0.05), ..Options::default() },
             refinements: 0,
             ..job([0.0; 3], 0.0)

@@ -13,7 +13,7 @@ use nullsweep_robot::{Arm, ArmSpec, Robot, Side};
 fn job(method: Method, cost: CostKind) -> Job {
     let held = vec![("torso_lift_joint".to_owned(), 0.2)];
     Job {
-        stance: StanceChoice::Given(Stance { base: [-0.708, -0.004, 1.047], held }),
+        stance: StanceChoice::Given(Stance { base: [-0.708, -0.004, 1.047], height: 0.0, held }),
         method,
         cost,
         ik_samples: 30,

@@ -19,7 +19,7 @@ fn config(tolerance: Tolerance) -> TaskConfig {
         // Poses of the gripper's tool frame, its x axis ahead.
         tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
         tolerance,
-        stance: Stance { base: [0.0; 3], held: Vec::new() },
+        stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
         start: None,
         profile: Profile::Velocity,
         collision: Options::default(),
@@ -139,7 +139,7 @@ fn what_was_scanned_is_in_the_way_of_given_poses() {
 #[test]
 fn a_scene_is_where_the_robot_does_not_stand() {
     let base = [1.0, -2.0, 0.7];
-    let stance = Stance { base, held: Vec::new() };
+    let stance = Stance { base, height: 0.0, held: Vec::new() };
     let scene = at_the_elbow(&plan(Tolerance::AXIS)).transformed(&stance.pose());
     let moved = TaskConfig { stance, ..config(Tolerance::AXIS) };
     let outcome = task::run(&Robot::pr2(), &common::dome(), &scene, &moved, &Silent).unwrap();

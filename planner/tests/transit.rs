@@ -11,7 +11,7 @@ use nullsweep_surface::{CleanConfig, Placement, place, simulate};
 
 fn stance() -> Stance {
     let held = vec![("torso_lift_joint".to_owned(), 0.2)];
-    Stance { base: [-0.708, -0.004, 1.047], held }
+    Stance { base: [-0.708, -0.004, 1.047], height: 0.0, held }
 }
 
 /// A part of the seat, the rest of the chair in the way.

@@ -64,6 +64,7 @@ mod tests {
             held: Vec::new(),
             tool,
             base: [0.0; 3],
+            base_height: 0.0,
             method: Method::Tsp,
             cost: CostKind::Time,
             profile: Profile::Velocity,

@@ -88,6 +88,9 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     row("fill-in patches, strokes", format!("{}, {}", f.fill_in_patches, f.strokes));
     row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
     row("base x, y, yaw", told(&f.base));
+    if f.base_height_m != 0.0 {
+        row("base above the floor", format!("{:.3} m", f.base_height_m));
+    }
     for (name, position) in &f.held {
         row(name, format!("{position:.3}"));
     }

@@ -6,7 +6,6 @@ use anyhow::Context;
 use clap::Args;
 use nullsweep_planner::link::publish::Join;
 use nullsweep_planner::plan::Plan;
-use nullsweep_planner::workcell::Stance;
 use nullsweep_robot::{JointVector, Tool};
 
 use crate::bars::Bars;
@@ -123,9 +122,11 @@ impl GotoArgs {
     /// Where the arguments have the robot stand.
     fn standing<'a>(&'a self, scans: &'a [PathBuf]) -> anyhow::Result<Way<'a>> {
         let held = crate::numbers::held(&self.held, self.torso);
-        let base = match self.base {
-            Some(Place(base)) => base,
-            None if scans.is_empty() && !self.way.has_demo() => [0.0; 3],
+        let place = match self.base {
+            Some(place) => place,
+            None if scans.is_empty() && !self.way.has_demo() => {
+                Place { base: [0.0; 3], height: 0.0 }
+            }
             None => {
                 let say = "where does the robot stand? Give --base x,y,yaw, or --plan PLAN for where \
                            that plan has it";
@@ -136,7 +137,7 @@ impl GotoArgs {
             robot: &self.robot,
             site: self.site.site(),
             scans,
-            stance: Stance { base, held },
+            stance: place.stance(held),
             tool: self.tool.as_deref().map_or(Ok(Tool::default()), tool_file)?,
             plan: None,
         })

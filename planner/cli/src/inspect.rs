@@ -38,6 +38,7 @@ struct Summary {
     robot: String,
     fingerprint: String,
     base: [f64; 3],
+    base_height: f64,
     method: String,
     cost: String,
     seed: u64,
@@ -106,6 +107,7 @@ fn summarise(plan: &Plan) -> Summary {
         robot: plan.robot.clone(),
         fingerprint: format!("{:016x}", plan.fingerprint),
         base: plan.base,
+        base_height: plan.base_height,
         method: format!("{:?}", plan.method),
         cost: format!("{:?}", plan.cost),
         seed: plan.seed,
@@ -128,6 +130,9 @@ fn tables(s: &Summary) -> String {
     let mut plan = sheet(["plan", ""]);
     plan.add_row(["robot", &format!("{} ({})", s.robot, s.fingerprint)]);
     plan.add_row(["base x, y, yaw", &told(&s.base)]);
+    if s.base_height != 0.0 {
+        plan.add_row(["base above the floor", &format!("{:.3} m", s.base_height)]);
+    }
     plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
     plan.add_row(["verified", s.unverified_because.as_deref().map_or("yes", |why| why)]);
     plan.add_row(["knots (on the surface)", &format!("{} ({})", s.knots, s.knots_on_surface)]);

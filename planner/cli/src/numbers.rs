@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nullsweep_planner::progress::Progress;
+use nullsweep_planner::workcell::Stance;
 
 /// Any finite number.
 pub(super) fn finite(text: &str) -> Result<f64, String> {
@@ -87,20 +89,60 @@ pub(super) fn percent(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)
 }
 
-/// A place on the floor: x, y \[m\] and yaw \[rad\], or in degrees with `°` or `deg` behind it, as it is
-/// told to people.
+/// A place of the robot: x, y \[m\] and yaw \[rad\], or in degrees with `°` or `deg` behind it, as it is
+/// told to people; and where it stands above the floor, its height \[m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Place(pub(super) [f64; 3]);
+pub(super) struct Place {
+    pub(super) base: [f64; 3],
+    pub(super) height: f64,
+}
+
+impl Place {
+    /// The robot there, and its held joints.
+    pub(super) fn stance(self, held: Vec<(String, f64)>) -> Stance {
+        Stance { base: self.base, height: self.height, held }
+    }
+
+    /// Tells that the robot does not stand on the floor.
+    pub(super) fn tell(&self, progress: &dyn Progress) {
+        if self.height != 0.0 {
+            progress.note(&format!(
+                "the robot's root frame is {:.3} m above the floor; nothing stands for what it is \
+                 raised by",
+                self.height
+            ));
+        }
+    }
+}
 
 impl FromStr for Place {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let degrees = ["°", "deg"].iter().find_map(|unit| text.trim_end().strip_suffix(unit));
-        let metres = degrees.unwrap_or(text).replace(" m,", ",");
-        let Numbers([x, y, yaw]) = metres.parse()?;
-        Ok(Self([x, y, if degrees.is_some() { yaw.to_radians() } else { yaw }]))
+        let mut parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        let degrees =
+            parts.get(2).and_then(|yaw| ["°", "deg"].iter().find_map(|unit| before(yaw, unit)));
+        if let Some(number) = degrees {
+            parts[2] = number;
+        }
+        let numbers: Vec<&str> =
+            parts.iter().map(|part| before(part, " m").unwrap_or(part)).collect();
+        let (numbers, height) = match numbers[..] {
+            [_, _, _, height] => {
+                let height = finite(height).map_err(|e| format!("`{height}`: {e}"))?;
+                (&numbers[..3], height)
+            }
+            _ => (&numbers[..], 0.0),
+        };
+        let Numbers([x, y, yaw]) = numbers.join(",").parse()?;
+        let yaw = if degrees.is_some() { yaw.to_radians() } else { yaw };
+        Ok(Self { base: [x, y, yaw], height })
     }
+}
+
+/// What stands before a unit.
+fn before<'a>(text: &'a str, unit: &str) -> Option<&'a str> {
+    text.strip_suffix(unit).map(str::trim_end)
 }
 
 #[test]
@@ -108,11 +150,15 @@ fn a_yaw_is_told_within_half_a_turn_and_read_as_it_is_told() {
     let place = [1.0, -0.5, 1.5 * std::f64::consts::PI];
     let told = nullsweep_planner::workcell::stance::told(&place);
     assert_eq!(told, "1.000 m, -0.500 m, -90.0°");
-    let Place([x, y, yaw]) = told.parse().expect("a place");
+    let Place { base: [x, y, yaw], height } = told.parse().expect("a place");
+    assert_eq!(height, 0.0);
     assert!((x, y) == (1.0, -0.5) && (yaw + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
-    assert_eq!("1,2,-0.5".parse(), Ok(Place([1.0, 2.0, -0.5])));
-    assert_eq!("1,2,180deg".parse(), Ok(Place([1.0, 2.0, std::f64::consts::PI])));
-    for wrong in ["1,2", "1,2,°", "1,2,inf", "1,2,3,4"] {
+    let at = |base, height| Ok(Place { base, height });
+    assert_eq!("1,2,-0.5".parse(), at([1.0, 2.0, -0.5], 0.0));
+    assert_eq!("1,2,180deg".parse(), at([1.0, 2.0, std::f64::consts::PI], 0.0));
+    assert_eq!("1,2,-0.5,0.3".parse(), at([1.0, 2.0, -0.5], 0.3));
+    assert_eq!("1 m, 2 m, 180°, 0.3 m".parse(), at([1.0, 2.0, std::f64::consts::PI], 0.3));
+    for wrong in ["1,2", "1,2,°", "1,2,inf", "1,2,3,4,5", "1,2,3,", "1,2,3,nan"] {
         wrong.parse::<Place>().expect_err(wrong);
     }
     assert_eq!(percent(0.9871), "98.71 %");

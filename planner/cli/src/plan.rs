@@ -51,7 +51,8 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "FILE")]
     tool: Option<PathBuf>,
     /// Where the robot stands in the floor frame: x,y,yaw (in radians, or degrees with
-    /// ° or deg behind them), or `auto`: where it reaches most.
+    /// ° or deg behind them), or x,y,yaw,z where it is raised so far above the floor; or `auto`:
+    /// where it reaches most.
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     base: Base,
     /// Height of the PR2's torso joint; without it `--base auto` chooses it too. [m]
@@ -145,14 +146,14 @@ const HOVERS: f64 = 0.005;
 #[derive(Clone, Copy, Debug)]
 enum Base {
     Auto,
-    At([f64; 3]),
+    At(Place),
 }
 
 impl FromStr for Base {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "auto" { Ok(Self::Auto) } else { Ok(Self::At(Place::from_str(text)?.0)) }
+        if text == "auto" { Ok(Self::Auto) } else { Ok(Self::At(Place::from_str(text)?)) }
     }
 }
 
@@ -337,9 +338,13 @@ fn job(
     let stance = match (&after, args.base) {
         (Some(after), _) => StanceChoice::Given(Stance {
             base: after.plan.base,
+            height: after.plan.base_height,
             held: after.plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
         }),
-        (None, Base::At(base)) => StanceChoice::Given(Stance { base, held: held(args) }),
+        (None, Base::At(place)) => {
+            place.tell(bars);
+            StanceChoice::Given(place.stance(held(args)))
+        }
         (None, Base::Auto) => {
             let mut search =
                 StanceSearch { held: held(args), ..StanceSearch::of(robot, &arm, &tool) };

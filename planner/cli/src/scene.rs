@@ -7,7 +7,7 @@ use clap::Args;
 use nalgebra::Point3;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
-use nullsweep_surface::{CleanConfig, CropBox, PlacedScan, Placement, scan, simulate};
+use nullsweep_surface::{CleanConfig, CropBox, PlacedScan, Placement, scan, simulate, unseen};
 
 use crate::bars::Bars;
 use crate::placed::{Gravity, PlacedArgs, read_scans};
@@ -23,7 +23,8 @@ pub(super) struct SceneArgs {
     /// it the table is taken to reach 0.45 m beyond the object on every side. [m]
     #[arg(long, value_name = "LxW", requires = "support_height")]
     table: Option<TableSize>,
-    /// What the space that no view has seen is: kept clear of, or taken for free.
+    /// What the space that no view has seen is: kept clear of, but for 2 cm that a sensor may be wrong
+    /// by (avoid), kept clear of altogether (forbid), or taken for free.
     #[arg(long, value_enum, default_value = "avoid")]
     unseen: UnseenArg,
     /// Keep only this box of the floor frame as the surface to sweep, the rest stays an obstacle:
@@ -66,6 +67,8 @@ pub(super) enum Demo {
 enum UnseenArg {
     /// Nothing of robot or tool comes deeper than 2 cm into it.
     Avoid,
+    /// Nothing of robot or tool comes into it.
+    Forbid,
     /// It is free.
     Free,
 }
@@ -78,30 +81,39 @@ pub(super) fn scene(
     seed: u64,
     bars: &Bars,
 ) -> anyhow::Result<Scene> {
-    let (mut scene, flying) = if let Some(choice) = args.object {
+    let (placed, (mut scene, flying)) = if let Some(choice) = args.object {
         ensure!(demo.is_none(), "--object chooses from a scan, not from a demo");
         let placed = read_scans(&args.placed, scans, seed, Gravity::Found, bars)?;
-        room::object(&placed, choice, bars)?
+        let seen = room::object(&placed, choice, bars)?;
+        (placed.scan, seen)
     } else {
         let (placed, region) = match demo {
             Some(demo) => simulated(demo, seed),
             None => (read_scans(&args.placed, scans, seed, Gravity::Given, bars)?.scan, None),
         };
         let region = args.crop.or(region);
-        Scene::seen(&placed, region.as_ref(), &CleanConfig::default())?
+        let seen = Scene::seen(&placed, region.as_ref(), &CleanConfig::default())?;
+        (placed, seen)
     };
     if !flying.is_empty() {
         let flying = flying.len();
         bars.note(&format!("{flying} points fly alone and are taken for nothing"));
     }
-    if args.unseen == UnseenArg::Free && !scene.unseen.is_empty() {
-        scene.unseen.clear();
-        bars.note("space that no view has seen counts as free");
+    match args.unseen {
+        UnseenArg::Free if !scene.unseen.is_empty() => {
+            scene.unseen.clear();
+            bars.note("space that no view has seen counts as free");
+        }
+        UnseenArg::Forbid if scene.unseen.is_empty() => bars.note(
+            "no view has a known sensor: which space was not seen is not known, and none is kept clear of",
+        ),
+        UnseenArg::Forbid => scene.unseen = unseen::border(&placed, &scene.surface, 0.0),
+        UnseenArg::Free | UnseenArg::Avoid => {}
     }
     if demo.is_some() && args.placed.support_height > 0.0 {
         bars.note("a simulated scene stands on the floor: there is no table under it");
     } else if args.placed.support_height > 0.0 {
-        scene.obstacles.push(table::under(
+        scene.obstacles.extend(table::under(
             &scene.surface,
             args.placed.support_height,
             args.table,

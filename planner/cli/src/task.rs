@@ -160,6 +160,7 @@ impl PoseArgs {
         }
         let tool = self.tool.as_deref().map_or(Ok(task::tip_tool()), tool_file)?;
         let scene = self.scene(&poses, &tool, bars)?;
+        self.base.tell(bars);
         let stance = self.stance();
         let arm = stance.bind(&robot.arm(&self.robot.spec())?)?;
         let start = |posture: &PostureArg| {
@@ -205,7 +206,7 @@ impl PoseArgs {
     }
 
     fn stance(&self) -> Stance {
-        Stance { base: self.base.0, held: crate::numbers::held(&self.held, self.torso) }
+        self.base.stance(crate::numbers::held(&self.held, self.torso))
     }
 }
 

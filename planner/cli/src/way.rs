@@ -62,7 +62,7 @@ impl<'a> Way<'a> {
         scans: &'a [PathBuf],
     ) -> Self {
         let held = plan.held.iter().map(|h| (h.name.clone(), h.position)).collect();
-        let stance = Stance { base: plan.base, held };
+        let stance = Stance { base: plan.base, height: plan.base_height, held };
         Self { robot, site, scans, stance, tool: plan.tool.clone(), plan: Some(plan) }
     }
 

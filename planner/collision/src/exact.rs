@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point3;
 use nullsweep_robot::{Arm, JointVector, Robot, Tool};
-use parry3d_f64::bounding_volume::BoundingVolume;
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::{Pose, Vec3};
 use parry3d_f64::shape::Shape;
 
@@ -30,6 +30,9 @@ pub struct Exact {
     scene: Scene,
     tree: Tree,
 }
+
+/// More than rounding may take away from the distance of bounds. \[m\]
+const ROUNDING: f64 = 1e-9;
 
 impl Exact {
     /// Prepares the check of an arm with a tool among points and obstacles, both in the robot's root
@@ -96,8 +99,12 @@ impl Exact {
     pub fn first_hit(&self, q: &JointVector, contact: ToolContact) -> Option<Hit> {
         let scene = &self.scene;
         let poses = poses(&scene.parts, scene.links, &self.arm, q);
+        let bounds = self.bounds(&poses);
         let margin = scene.margins.self_clearance;
         for &(a, b) in &scene.pairs.checked {
+            if are_apart(&bounds[a], &bounds[b], margin) {
+                continue;
+            }
             let (first, second) = (&scene.parts[a], &scene.parts[b]);
             let distance = distance(&poses[a], &*first.shape, &poses[b], &*second.shape);
             if breaks(distance, margin) {
@@ -106,8 +113,14 @@ impl Exact {
             }
         }
         let moving: Vec<usize> = (0..poses.len()).filter(|&i| scene.moves[i]).collect();
-        self.obstacle_hit(&poses, &moving, true)
-            .or_else(|| self.point_hit(q, &poses, &moving, contact))
+        self.obstacle_hit(&poses, &bounds, &moving, true)
+            .or_else(|| self.point_hit(q, &poses, &bounds, &moving, contact))
+    }
+
+    /// The axis-aligned bounds of each part.
+    fn bounds(&self, poses: &[Pose]) -> Vec<Aabb> {
+        let parts = self.scene.parts.iter().zip(poses);
+        parts.map(|(part, pose)| part.shape.compute_aabb(pose)).collect()
     }
 
     /// The first part that does not move with the arm (base, torso, other arm) and is too near to
@@ -117,12 +130,19 @@ impl Exact {
         let scene = &self.scene;
         let q = self.arm.home();
         let poses = poses(&scene.parts, scene.links, &self.arm, &q);
+        let bounds = self.bounds(&poses);
         let fixed: Vec<usize> = (0..poses.len()).filter(|&i| !scene.moves[i]).collect();
-        self.obstacle_hit(&poses, &fixed, false)
-            .or_else(|| self.point_hit(&q, &poses, &fixed, ToolContact::Forbidden))
+        self.obstacle_hit(&poses, &bounds, &fixed, false)
+            .or_else(|| self.point_hit(&q, &poses, &bounds, &fixed, ToolContact::Forbidden))
     }
 
-    fn obstacle_hit(&self, poses: &[Pose], parts: &[usize], with_floor: bool) -> Option<Hit> {
+    fn obstacle_hit(
+        &self,
+        poses: &[Pose],
+        bounds: &[Aabb],
+        parts: &[usize],
+        with_floor: bool,
+    ) -> Option<Hit> {
         let scene = &self.scene;
         let margin = scene.margins.environment;
         for (index, obstacle) in scene.obstacles.iter().enumerate() {
@@ -130,7 +150,11 @@ impl Exact {
                 continue;
             }
             let at = pose(&obstacle.pose);
+            let around = obstacle.shape.compute_aabb(&at);
             for &i in parts.iter().filter(|&&i| !scene.grounded.contains(&(i, index))) {
+                if are_apart(&bounds[i], &around, margin) {
+                    continue;
+                }
                 let shape = &*scene.parts[i].shape;
                 let distance = distance(&poses[i], shape, &at, &*obstacle.shape);
                 if breaks(distance, margin) {
@@ -147,6 +171,7 @@ impl Exact {
         &self,
         q: &JointVector,
         poses: &[Pose],
+        bounds: &[Aabb],
         parts: &[usize],
         contact: ToolContact,
     ) -> Option<Hit> {
@@ -169,7 +194,7 @@ impl Exact {
             };
             let shape = &*scene.parts[i].shape;
             // Points outside the shape's bounds, grown by the margin, are farther than it.
-            let bounds = shape.compute_aabb(&poses[i]).loosened(margin);
+            let bounds = bounds[i].loosened(margin);
             let corner = |v: Vec3| Point3::new(v.x, v.y, v.z);
             let hit = self.tree.find(&corner(bounds.mins), &corner(bounds.maxs), |index| {
                 let p = &scene.points.points[index];
@@ -195,6 +220,13 @@ impl std::fmt::Debug for Exact {
             .field("points", &self.scene.points.points.len())
             .finish_non_exhaustive()
     }
+}
+
+/// Whether bounds alone show that two shapes keep a margin. \[m\]
+fn are_apart(a: &Aabb, b: &Aabb, margin: f64) -> bool {
+    let need = margin + ROUNDING;
+    let (over, under) = (a.mins - b.maxs, b.mins - a.maxs);
+    over.max_element().max(under.max_element()) > need
 }
 
 /// NaN breaks every margin.

@@ -316,7 +316,7 @@ pub fn tracked(
                 progress.tick();
                 let f = &outcome.figures;
                 let held = f.held.iter().map(|(name, &value)| (name.clone(), value)).collect();
-                job.stance = StanceChoice::Given(Stance { base: f.base, held });
+                job.stance = StanceChoice::Given(Stance { base: f.base, height: 0.0, held });
                 let spent = |stage: &str| f.calc_time_s.get(stage).copied().unwrap_or(0.0);
                 rows.push(Tracked {
                     optimised,

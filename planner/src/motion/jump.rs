@@ -23,7 +23,21 @@ pub fn jump(
     seed: u64,
 ) -> Option<Vec<JointVector>> {
     let to = cell.arm.continuous().nearest_turn(to, from);
-    across(cell, lift(cell, from)?, lift(cell, &to)?, seed)
+    across(cell, lift(cell, from)?, lift(cell, &to)?, &Options::default(), seed)
+}
+
+/// Whether some path leads from one contact (or free configuration) to another, as [`jump`] looks for
+/// it: none is made short.
+pub(super) fn is_joined(
+    cell: Workcell<'_>,
+    from: &JointVector,
+    to: &JointVector,
+    seed: u64,
+) -> bool {
+    let to = cell.arm.continuous().nearest_turn(to, from);
+    let options = Options { shortcuts: 0, ..Options::default() };
+    let ends = || Some((lift(cell, from)?, lift(cell, &to)?));
+    ends().is_some_and(|(up, down)| across(cell, up, down, &options, seed).is_some())
 }
 
 /// As [`jump`], but the tool backs off even where it is free, as far as that goes.
@@ -38,7 +52,7 @@ pub fn reconfigure(
     let off = |q: &JointVector| {
         retract(cell.world, cell.arm, cell.tool, q, LIFT).or_else(|| lift(cell, q))
     };
-    across(cell, off(from)?, off(&to)?, seed)
+    across(cell, off(from)?, off(&to)?, &Options::default(), seed)
 }
 
 /// The path that goes up the first way, through free space, and back the second way.
@@ -46,12 +60,12 @@ fn across(
     cell: Workcell<'_>,
     mut path: Vec<JointVector>,
     mut down: Vec<JointVector>,
+    options: &Options,
     seed: u64,
 ) -> Option<Vec<JointVector>> {
-    let options = Options::default();
     down.reverse();
     let (above, goal) = (path.pop()?, down[0]);
-    let across = rrt_connect(cell.world, cell.arm, &above, &goal, &options, seed)?;
+    let across = rrt_connect(cell.world, cell.arm, &above, &goal, options, seed)?;
     let arrived = *across.last()?;
     path.extend(across);
     // The set-down turns with the transfer's end.

@@ -16,6 +16,8 @@ pub struct Memo {
     pub(super) seed: u64,
     /// Along the surface, the redundancy parameter changing evenly.
     pub(super) tracks: Table<Result<Motion<Leg>, Blocked>>,
+    /// Whether the arm comes to a sample through free space from where it is at first.
+    pub(super) joined: Table<bool>,
     /// All others.
     pub(super) ways: Table<Option<Motion<Leg>>>,
 }
@@ -24,7 +26,7 @@ impl Memo {
     /// Nothing was made yet.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self { seed, tracks: Table::default(), ways: Table::default() }
+        Self { seed, tracks: Table::default(), joined: Table::default(), ways: Table::default() }
     }
 }
 

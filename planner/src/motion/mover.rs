@@ -3,7 +3,7 @@
 use nullsweep_robot::JointVector;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-use super::jump::jump;
+use super::jump::{is_joined, jump};
 use super::layered::{Link, Motion, Moves};
 use super::leg::Leg;
 use super::memo::{How, Key, Memo};
@@ -30,6 +30,10 @@ pub struct Mover<'a, C> {
 const LIFT_JOINTS: usize = 4;
 /// How far each of them moves. \[rad\]
 const LIFT_ANGLE: f64 = 0.8;
+
+/// Joint vectors are alike no joint of which is farther apart, but for the last, which turns the pad.
+/// \[rad\] or \[m\]
+const ALIKE: f64 = 0.25;
 
 /// What a jump costs besides its path: four joints moved by 0.8 rad, for an arm of `dof` joints.
 #[must_use]
@@ -152,6 +156,18 @@ impl<C: Cost> Moves for Mover<'_, C> {
 
     fn lifts(&self, at: &Sample) -> bool {
         lift(self.cell, &at.q).is_some()
+    }
+
+    fn is_joined(&self, at: &Sample) -> bool {
+        self.memo.joined.get(Key::new(How::Start, &self.source, at), || {
+            is_joined(self.cell, &self.source, &at.q, self.seed_of(&self.source, &at.q))
+        })
+    }
+
+    fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
+        let turns_the_pad = self.cell.arm.dof() - 1;
+        let apart = self.cell.arm.continuous().displacement(&a.q, &b.q);
+        a.branch == b.branch && apart[..turns_the_pad].iter().all(|joint| joint.abs() <= ALIKE)
     }
 
     fn jump_estimate(&self, straight: f64) -> f64 {

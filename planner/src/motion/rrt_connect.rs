@@ -14,15 +14,20 @@ pub struct Options {
     pub samples: usize,
     /// Longest segment of a tree, Euclidean over the joints. \[rad\]
     pub step: f64,
-    /// Shortcuts tried on the path found.
+    /// Shortcuts tried on the path found; 0 leaves it as it is.
     pub shortcuts: usize,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 600, step: 0.8, shortcuts: 60 }
+        Self { samples: 300, step: 0.8, shortcuts: 60 }
     }
 }
+
+/// Samples after which an end that none of them leads away from is shut in.
+const SHUT_IN: usize = 120;
+/// Shortcuts in succession that are none, after which no more are tried.
+const VAIN: usize = 15;
 
 /// A path from `from` to `to` on which the tool too keeps its margin: the straight joint line if
 /// that is free, else RRT-Connect (Kuffner and LaValle, 2000) and shortcuts.
@@ -62,7 +67,10 @@ pub fn rrt_connect(
 
     let mut trees = [Tree::new(*from), Tree::new(goal)];
     let mut growing = 0;
-    for _ in 0..options.samples {
+    for drawn in 0..options.samples {
+        if drawn == SHUT_IN && trees.iter().any(|tree| tree.nodes.len() == 1) {
+            return None;
+        }
         let mut sample = JointVector::default();
         for (value, (lower, upper)) in sample.iter_mut().zip(&ranges) {
             *value = rng.random_range(*lower..=*upper);
@@ -78,7 +86,9 @@ pub fn rrt_connect(
                 if growing == 1 {
                     path.reverse();
                 }
-                shortcut(&mut path, options.shortcuts, &mut rng, free);
+                if options.shortcuts > 0 {
+                    shortcut(&mut path, options.shortcuts, &mut rng, free);
+                }
                 return Some(path);
             }
         }
@@ -164,10 +174,15 @@ fn shortcut(
     rng: &mut ChaCha8Rng,
     free: impl Fn(&JointVector, &JointVector) -> bool,
 ) {
+    let mut in_vain = 0;
     for _ in 0..tries {
         if path.len() < 3 {
             return;
         }
+        if in_vain == VAIN {
+            break;
+        }
+        in_vain += 1;
         // Two places anywhere on the path, as segment and fraction.
         let mut place = || {
             let at = rng.random_range(0.0..(path.len() - 1) as f64);
@@ -190,6 +205,7 @@ fn shortcut(
         around.push(b);
         if a.distance(&b) < length(&around) - 1e-9 && free(&a, &b) {
             path.splice(first.0 + 1..=second.0, [a, b]);
+            in_vain = 0;
         }
     }
     // Waypoints that nothing stands in the way of leaving out.

@@ -2,14 +2,19 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use nullsweep_collision::{self as collision, Obstacle, ToolContact, World};
 use nullsweep_robot::{Arm, ArmSpec, Geometry, JointVector, Robot, Side, Solutions, Tool};
+use nullsweep_surface::{Patch, Scan, Surface};
 
-use super::jump;
+use super::layered::{Link, Motion, Moves};
 use super::retreat::retract;
 use super::rrt_connect::{Options, length, rrt_connect};
-use crate::workcell::Workcell;
+use super::{Leg, Memo, Mover, jump};
+use crate::cost::Effort;
+use crate::progress::Silent;
+use crate::roadmap::{GraphConfig, Nodes, graph};
+use crate::workcell::{Bed, Sample, Workcell, contact_pose, direction, reach, redundancies};
 
 /// A flat board before the robot, a post standing on its right half.
 fn setting() -> (Arm, Tool, World) {
@@ -109,4 +114,86 @@ fn no_way_is_a_result() {
     };
     let options = Options { samples: 0, ..Options::default() };
     assert_eq!(rrt_connect(&world, &arm, &lift(-0.42), &lift(0.02), &options, 1), None);
+}
+
+/// Asks for a motion along an edge, or beside it.
+type Way = fn(&Mover<'_, Effort>, (usize, bool), &Sample, &Sample) -> Result<Motion<Leg>, String>;
+
+/// What there is to a motion, to the bit.
+fn told(motion: Motion<Leg>) -> (u64, Vec<JointVector>, Vec<Option<Point3<f64>>>) {
+    (motion.cost.to_bits(), motion.path.joints, motion.path.line)
+}
+
+#[test]
+fn a_motion_is_the_same_whether_it_was_asked_for_before_or_not() {
+    let (arm, tool, world) = setting();
+    let cell = Workcell { arm: &arm, tool: &tool, world: &world };
+    let points: Vec<Point3<f64>> = (0..80 * 50)
+        .map(|n| {
+            let (i, k) = (f64::from(n % 80), f64::from(n / 80));
+            Point3::new(0.70, -0.60 + 0.01 * i, 0.60 + 0.01 * k)
+        })
+        .collect();
+    let outward = UnitVector3::new_normalize(-Vector3::x());
+    let normals = vec![outward; points.len()];
+    let bed =
+        Bed::soft(Surface::new(&Scan { raw: points.clone(), points, normals, spacing: 0.01 }));
+    // Beside the post, the pad meets it at some headings and redundancy values and not at others.
+    let patches: Vec<Patch> = [-0.36, -0.29]
+        .map(|y| Patch {
+            centre: Point3::new(0.70, y, 0.85),
+            normal: outward,
+            points: Vec::new(),
+            rmse: 0.0,
+        })
+        .into();
+    let reached = reach(cell, &patches, 24, &|| ());
+    assert!(reached.iter().all(Option::is_some));
+    let nodes = Nodes { bed: &bed, patches: &patches, reached: &reached };
+    let graph = graph::build(cell, nodes, &GraphConfig::default(), None, &Silent);
+    let values = redundancies(arm.ik().redundancy_range(), 12);
+    let layer = |patch: usize| {
+        let heading = graph.edges[0].heading_a;
+        let Patch { centre, normal, .. } = &patches[patch];
+        let pose = contact_pose(centre, normal, &direction(normal, heading), tool.stand_off);
+        let mut samples = Vec::new();
+        cell.samples(&pose, heading, &values, &mut samples);
+        samples
+    };
+    let (from, to) = (layer(0), layer(1));
+    let stops = [0, 1];
+    let source = arm.home();
+    let seed = 5;
+    let kept = Memo::new(seed);
+    let warm = Mover::new(cell, &graph, &stops, &Effort, source, &kept);
+    let Link::Surface { edge, reversed } = warm.link(0, 1) else { panic!("an edge") };
+    let (mut made, mut failed) = ([0; 3], [0; 3]);
+    // What is asked for again comes after other motions.
+    for round in 0..2 {
+        let pairs = from.iter().flat_map(|a| to.iter().map(move |b| (a, b)));
+        // No track arrives beside a sample.
+        let beside = |b: &Sample| Sample { q: b.q + JointVector::from_fn(|_| 0.05), ..*b };
+        let ends = |(a, b): (&Sample, &Sample)| [(*a, *b), (*a, beside(b))];
+        for (a, b) in pairs.step_by(5).take(40).flat_map(ends) {
+            let (a, b) = (&a, &b);
+            let fresh = Memo::new(seed);
+            let cold = Mover::new(cell, &graph, &stops, &Effort, source, &fresh);
+            let ways: [Way; 3] = [
+                |mover, link, a, b| mover.track(link, a, b).map_err(|b| format!("{b:?}")),
+                |mover, link, a, b| mover.around(link, a, b).ok_or_else(String::new),
+                |mover, _, a, b| mover.jump(Some(a), b).ok_or_else(String::new),
+            ];
+            for (kind, way) in ways.into_iter().enumerate() {
+                let [one, other] = [&warm, &cold].map(|m| way(m, (edge, reversed), a, b).map(told));
+                assert_eq!(one, other, "round {round}");
+                made[kind] += usize::from(one.is_ok());
+                failed[kind] += usize::from(one.is_err());
+            }
+        }
+        let fresh = Memo::new(seed);
+        let cold = Mover::new(cell, &graph, &stops, &Effort, source, &fresh);
+        let [one, other] = [&warm, &cold].map(|mover| mover.jump(None, &to[0]).map(told));
+        assert_eq!(one, other);
+    }
+    assert!(made.iter().all(|n| *n > 0) && failed[0] > 0, "{made:?} made, {failed:?} not");
 }

@@ -38,6 +38,7 @@ impl Planning<'_> {
         timing::set_times(&mut knots, &self.velocity);
         Plan {
             base: stance.base,
+            base_height: stance.height,
             method: job.method,
             cost: job.cost,
             seed: job.seed,

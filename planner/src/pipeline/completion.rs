@@ -11,6 +11,7 @@
 //! A stop between two jumps would be a touch that sweeps nothing: it gets a stroke, a side trip to a
 //! place beside it.
 
+use std::cell::RefCell;
 use std::collections::HashSet;
 
 use nalgebra::UnitVector3;
@@ -61,9 +62,9 @@ impl Planning<'_> {
     pub(super) fn complete(&self, attempt: &mut Attempt, clock: &mut Clock) {
         self.progress.stage("side trips", None);
         clock.time("side trips", || match self.job.cost {
-            CostKind::Effort => Completion { planning: self, cost: &Effort }.run(attempt),
+            CostKind::Effort => Completion::new(self, &Effort).run(attempt),
             CostKind::Time => {
-                Completion { planning: self, cost: &TaskTime::new(&self.velocity) }.run(attempt);
+                Completion::new(self, &TaskTime::new(&self.velocity)).run(attempt);
             }
         });
         let Attempt { patches, sequence, left, .. } = attempt;
@@ -78,9 +79,15 @@ impl Planning<'_> {
 struct Completion<'a, C> {
     planning: &'a Planning<'a>,
     cost: &'a C,
+    /// Samples to which no jump led as they are not joined to where the arm is at first, no two alike.
+    shut: RefCell<Vec<Sample>>,
 }
 
-impl<C: Cost> Completion<'_, C> {
+impl<'p, C: Cost> Completion<'p, C> {
+    fn new(planning: &'p Planning<'p>, cost: &'p C) -> Self {
+        Self { planning, cost, shut: RefCell::default() }
+    }
+
     fn run(&self, attempt: &mut Attempt) {
         let full = patches::full_neighbourhood(self.planning.scan, self.planning.fill_in_radius());
         let worth = ((WORTH * full as f64) as usize).max(1);
@@ -239,8 +246,9 @@ impl<C: Cost> Completion<'_, C> {
     /// there is found.
     fn visit(&self, attempt: &mut Attempt) -> Option<usize> {
         let insertion = self.insertion(attempt);
+        let shut = &mut *self.shut.borrow_mut();
         let (at, there, after) =
-            insertion.along_the_surface().or_else(|| insertion.through_free_space())?;
+            insertion.along_the_surface().or_else(|| insertion.through_free_space(shut))?;
         let visits = &mut attempt.sequence.visits;
         match after {
             After::Back => there_and_back(visits, at, there),
@@ -324,8 +332,9 @@ impl<C: Cost> Insertion<'_, C> {
             .find_map(|to| self.mover.along(&edge, false, from, to).map(|motion| (*to, motion)))
     }
 
-    /// A jump to the patch and one from there on, in place of a jump or at the end.
-    fn through_free_space(&self) -> Option<(usize, Visit, After)> {
+    /// A jump to the patch and one from there on, in place of a jump or at the end. Samples that are
+    /// like one of those that are `shut` in are not tried.
+    fn through_free_space(&self, shut: &mut Vec<Sample>) -> Option<(usize, Visit, After)> {
         let continuous = self.planning.cell.arm.continuous();
         let straight =
             |from: &JointVector, to: &JointVector| self.cost.of(&continuous.displacement(from, to));
@@ -354,20 +363,37 @@ impl<C: Cost> Insertion<'_, C> {
         // The best place of each sample is enough, and a sample that cannot be lifted off is none.
         let mut seen = HashSet::new();
         choices.retain(|(_, _, s)| seen.insert(s.q.map(f64::to_bits)));
+        let is_shut = |shut: &[Sample], sample: &Sample| {
+            shut.iter().any(|other| self.mover.are_alike(other, sample))
+        };
+        choices.retain(|(_, _, sample)| !is_shut(shut, sample));
         choices.truncate(JUMPS);
         choices.chunks(BATCH).find_map(|batch| {
-            let made: Vec<_> = batch
+            let made: Vec<Result<_, Option<Sample>>> = batch
                 .par_iter()
+                .filter(|(_, _, sample)| !is_shut(shut, sample))
                 .map(|(_, at, sample)| {
-                    let there = self.mover.jump(before(*at), sample)?.path;
+                    let jump = self.mover.jump(before(*at), sample);
+                    let is_joined = jump.is_some() || self.mover.is_joined(sample);
+                    let there = jump.ok_or((!is_joined).then_some(*sample))?.path;
                     let after = match self.visits.get(*at) {
                         None => After::End,
-                        Some(next) => After::On(self.mover.jump(Some(sample), &next.sample)?.path),
+                        Some(next) => {
+                            After::On(self.mover.jump(Some(sample), &next.sample).ok_or(None)?.path)
+                        }
                     };
-                    Some((*at, Visit { patch: self.patch, sample: *sample, leg: there }, after))
+                    Ok((*at, Visit { patch: self.patch, sample: *sample, leg: there }, after))
                 })
                 .collect();
-            made.into_iter().flatten().next()
+            let mut found = None;
+            for result in made {
+                match result {
+                    Ok(visit) => found = found.or(Some(visit)),
+                    Err(Some(sample)) if !is_shut(shut, &sample) => shut.push(sample),
+                    Err(_) => {}
+                }
+            }
+            found
         })
     }
 

@@ -34,6 +34,8 @@ pub struct Figures {
     pub components: usize,
     /// x, y \[m\] and yaw \[rad\] of the robot's root frame in the floor frame.
     pub base: [f64; 3],
+    /// How high above the floor it is. \[m\]
+    pub base_height_m: f64,
     /// Held joints that the stance sets. \[rad\] or \[m\]
     pub held: BTreeMap<String, f64>,
     /// Samples of the inverse kinematics that the layered graph had.

@@ -6,6 +6,7 @@ use nullsweep_surface::{Patch, Scan};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::elsewhere::FreeFrom;
 use crate::workcell::{Cause, Workcell, obstruction};
 
 /// All that one cause keeps from being swept.
@@ -21,6 +22,13 @@ pub struct LeftOut {
     /// By how much the posture that comes nearest falls short, least and most of the patches: of a
     /// margin \[m\], of a limit \[rad\] or \[m\]; none for what is no matter of postures.
     pub short: Option<[f64; 2]>,
+    /// From where else the arm would come to some of them, of the stances that were tried: for what
+    /// the arm meets something at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free_from: Option<FreeFrom>,
+    /// The patches.
+    #[serde(skip)]
+    pub(super) of: Vec<usize>,
     /// The points, as indices into the scan, ascending.
     #[serde(skip)]
     pub points: Vec<u32>,
@@ -42,7 +50,8 @@ impl std::fmt::Display for LeftOut {
                 write!(f, ", short by {} mm", span(1e3 * least, 1e3 * most, 0))
             }
             (_, None) => Ok(()),
-        }
+        }?;
+        self.free_from.as_ref().map_or(Ok(()), |free| write!(f, "; {free}"))
     }
 }
 
@@ -112,7 +121,8 @@ pub(super) fn left_out(cell: Workcell<'_>, known: &Known<'_>) -> Vec<LeftOut> {
             let short = of.iter().filter_map(|&p| causes[p].1).map(|s| [s, s]);
             let short = short.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
             let share = points.len() as f64 / total;
-            LeftOut { cause: cause.clone(), patches: of.len(), share, short, points }
+            let (cause, patches, of) = (cause.clone(), of.len(), of.into_iter().collect());
+            LeftOut { cause, patches, share, short, free_from: None, of, points }
         })
         .collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));

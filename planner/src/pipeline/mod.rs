@@ -4,6 +4,7 @@ mod assemble;
 mod attempt;
 mod clock;
 mod completion;
+mod elsewhere;
 mod end;
 mod error;
 mod figures;
@@ -15,6 +16,7 @@ mod setting;
 mod start;
 mod swept;
 
+pub use elsewhere::FreeFrom;
 pub use error::PipelineError;
 pub use figures::Figures;
 pub use job::{After, End, Job, StanceChoice};

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::attempt::{Attempt, Planning};
 use super::clock::Clock;
+use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
@@ -60,18 +61,18 @@ pub fn run(
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
     let surface = &scene.surface;
-    let patches = clock.time("patches", || {
+    let all = clock.time("patches", || {
         let found = patches::find(surface, &job.patches, job.seed);
         let bed = Bed::new(scene, &job.tool);
         found.into_par_iter().filter_map(|patch| bed.laid(patch)).collect::<Vec<_>>()
     });
-    if patches.is_empty() {
+    if all.is_empty() {
         return Err(PipelineError::NoPatches { points: surface.points.len() });
     }
 
     progress.stage("stance", None);
-    let setting = clock.time("stance", || settle(robot, &free_arm, scene, &patches, job))?;
-    let Setting { stance, arm, scene: here, patches, world } = setting;
+    let setting = clock.time("stance", || settle(robot, &free_arm, scene, &all, job))?;
+    let Setting { stance, arm, scene: here, patches, world, others } = setting;
     let scan = &here.surface;
     for note in world.notes() {
         progress.note(note);
@@ -122,7 +123,9 @@ pub fn run(
         dropped: &sequence.dropped,
         swept: &verification.swept,
     };
-    let left_out = clock.time("causes", || left_out(cell, &known));
+    let mut left_out = clock.time("causes", || left_out(cell, &known));
+    let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
+    clock.time("causes", || advise(&mut left_out, &others, &floor))?;
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {
@@ -133,6 +136,7 @@ pub fn run(
         fill_in_patches: patches.len() - found.len() - strokes,
         strokes,
         base: stance.base,
+        base_height_m: stance.height,
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,

@@ -5,11 +5,11 @@ use nullsweep_robot::{Arm, Robot};
 use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
+use super::elsewhere::Other;
 use super::error::PipelineError;
 use super::job::{Job, StanceChoice};
 use super::left_out::{Known, in_words, left_out};
 use super::start::start;
-use crate::progress::Silent;
 use crate::roadmap::{GraphConfig, Nodes, graph};
 use crate::workcell::stance::{self, Stance, StanceSearch};
 use crate::workcell::{Bed, Sample, Scene, Workcell, reach};
@@ -21,6 +21,8 @@ pub(super) struct Setting {
     pub(super) scene: Scene,
     pub(super) patches: Vec<Patch>,
     pub(super) world: World,
+    /// The other stances of a search that reach something, what promises most first.
+    pub(super) others: Vec<Other>,
 }
 
 /// Puts the robot where it is asked to stand, or where it reaches most.
@@ -78,7 +80,7 @@ fn search(
         }
         let setting = Setting::new(robot, arm, scene, patches, job, setting.stance)?;
         match setting.stands(job) {
-            Some(Stands::Ready) => return Ok(setting),
+            Some(Stands::Ready) => return Ok(setting.beside(open)),
             Some(Stands::Makeshift) if makeshift.is_none() => makeshift = Some(setting),
             _ => {}
         }
@@ -87,7 +89,7 @@ fn search(
         }
     }
     if let Some(setting) = makeshift {
-        return Ok(setting);
+        return Ok(setting.beside(open));
     }
     let why = match first {
         None => {
@@ -123,14 +125,18 @@ fn best_of(open: &[Open], job: &Job) -> Option<usize> {
     let mut order: Vec<usize> = (0..open.len()).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(open[i].most));
     let mut best: Option<(usize, usize)> = None;
+    order.truncate(SCORED);
     for batch in order.chunks(SIDE_BY_SIDE) {
-        if best.is_some_and(|(score, _)| open[batch[0]].most <= score) {
+        let beat = best.map(|(score, _)| score);
+        if beat.is_some_and(|score| open[batch[0]].most <= score) {
             break;
         }
-        let scores: Vec<usize> =
-            batch.par_iter().map(|&i| open[i].setting.score(job, &open[i].reached)).collect();
+        let score = |&i: &usize| open[i].setting.score(job, &open[i].reached, beat);
+        let scores: Vec<Option<usize>> = batch.par_iter().map(score).collect();
         for (score, &i) in scores.into_iter().zip(batch) {
-            if best.is_none_or(|(s, _)| score > s) {
+            if let Some(score) = score
+                && best.is_none_or(|(s, _)| score > s)
+            {
                 best = Some((score, i));
             }
         }
@@ -139,7 +145,7 @@ fn best_of(open: &[Open], job: &Job) -> Option<usize> {
 }
 
 impl Setting {
-    fn new(
+    pub(super) fn new(
         robot: &Robot,
         arm: &Arm,
         scene: &Scene,
@@ -153,10 +159,20 @@ impl Setting {
         let scene = scene.transformed(&to_root);
         let (points, obstacles) = (scene.points(), &scene.obstacles);
         let world = World::new(robot, &arm, &job.tool, points, obstacles, &job.collision)?;
-        Ok(Self { stance, arm, scene, patches, world })
+        Ok(Self { stance, arm, scene, patches, world, others: Vec::new() })
     }
 
-    fn cell<'a>(&'a self, job: &'a Job) -> Workcell<'a> {
+    /// It beside the others that were open to choice.
+    fn beside(self, mut open: Vec<Open>) -> Self {
+        open.sort_by_key(|other| std::cmp::Reverse(other.most));
+        let other = |open: Open| {
+            let reached = open.reached.iter().map(Option::is_some).collect();
+            Other { stance: open.setting.stance, reached }
+        };
+        Self { others: open.into_iter().map(other).collect(), ..self }
+    }
+
+    pub(super) fn cell<'a>(&'a self, job: &'a Job) -> Workcell<'a> {
         Workcell { arm: &self.arm, tool: &job.tool, world: &self.world }
     }
 
@@ -167,6 +183,11 @@ impl Setting {
         }
         let start = start(job, &self.arm, &self.world).ok()?;
         Some(if start.is_makeshift { Stands::Makeshift } else { Stands::Ready })
+    }
+
+    /// Whether body and arm have a place here.
+    pub(super) fn can_stand(&self, job: &Job) -> bool {
+        self.stands(job).is_some()
     }
 
     /// What keeps the arm from everything.
@@ -198,20 +219,27 @@ impl Setting {
     }
 
     /// Points of reached patches, each weighed by the edges that lead on from its patch, up to
-    /// `WELL_JOINED`.
-    fn score(&self, job: &Job, reached: &[Option<Sample>]) -> usize {
+    /// `WELL_JOINED`; `None` if that is no more than what is to be beaten.
+    fn score(&self, job: &Job, reached: &[Option<Sample>], beat: Option<usize>) -> Option<usize> {
         let bed = Bed::new(&self.scene, &job.tool);
-        let config = GraphConfig { edge_samples: 24, ..job.graph };
+        let config = GraphConfig { edge_samples: EDGE_SAMPLES, ..job.graph };
         let nodes = Nodes { bed: &bed, patches: &self.patches, reached };
-        let graph = graph::build(self.cell(job), nodes, &config, None, &Silent);
-        (0..self.patches.len())
-            .filter(|&i| reached[i].is_some())
-            .map(|i| self.patches[i].points.len() * (1 + graph.incident[i].len().min(WELL_JOINED)))
-            .sum()
+        let weighed = |edges: &[usize]| -> usize {
+            let patches = self.patches.iter().zip(reached).zip(edges);
+            let reached = patches.filter(|((_, reached), _)| reached.is_some());
+            reached.map(|((patch, _), edges)| patch.points.len() * (1 + edges)).sum()
+        };
+        let is_hopeless = |most: &[usize]| beat.is_some_and(|beat| weighed(most) <= beat);
+        let edges = graph::joined(self.cell(job), nodes, &config, WELL_JOINED, is_hopeless)?;
+        Some(weighed(&edges))
     }
 }
 
 /// Edges from a patch from which on a stance gains nothing by more of them.
 const WELL_JOINED: usize = 4;
+/// Redundancy values by which an edge is looked for where stances are compared.
+const EDGE_SAMPLES: usize = 12;
+/// Stances that are scored at most, those that promise most.
+const SCORED: usize = 12;
 /// Stances that are scored side by side.
 const SIDE_BY_SIDE: usize = 4;

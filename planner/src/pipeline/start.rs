@@ -81,3 +81,52 @@ fn posture(arm: &Arm, state: &collision::GroupState) -> Option<JointVector> {
     }
     Some(JointVector::new(q))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+    use nullsweep_collision::Obstacle;
+    use nullsweep_robot::{ArmSpec, Geometry, Robot, Side};
+
+    use super::*;
+
+    fn around(obstacles: &[Obstacle], job: &Job) -> (Arm, World) {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&job.arm).unwrap();
+        let world = World::new(&robot, &arm, &job.tool, &[], obstacles, &job.collision).unwrap();
+        (arm, world)
+    }
+
+    #[test]
+    fn an_arm_that_cannot_start_at_home_starts_where_it_is_free_and_that_is_told() {
+        let job = Job::new(ArmSpec::pr2(Side::Right));
+        let (arm, free) = around(&[], &job);
+        let Start { q, is_makeshift, note } = start(&job, &arm, &free).unwrap();
+        assert!((q, is_makeshift) == (arm.home(), false) && note.is_none(), "{note:?}");
+
+        // A box where the hand is at home.
+        let block = Obstacle {
+            name: "block".into(),
+            shape: Geometry::Box { half_extents: Vector3::repeat(0.05) }.into(),
+            pose: Isometry3::from(arm.tip_pose(&arm.home()).translation),
+            carries_robot: false,
+        };
+        let (arm, world) = around(std::slice::from_ref(&block), &job);
+        assert!(!world.is_free(&arm.home(), ToolContact::Forbidden));
+        let Start { q, is_makeshift, note } = start(&job, &arm, &world).unwrap();
+        assert!(is_makeshift && world.is_free(&q, ToolContact::Forbidden));
+        assert!(check(&arm, &world, &q).is_ok(), "outside of the limits");
+        let note = note.expect("it is told");
+        assert!(note.contains("cannot start at home") && note.contains("block"), "{note}");
+        let told = format!("{:.2},{:.2}", q[0], q[1]);
+        assert!(note.contains(&told), "{note} does not say {told}");
+
+        // Whoever says where the arm is means it.
+        let given = Job { start: Some(arm.home()), ..job.clone() };
+        assert!(matches!(start(&given, &arm, &world), Err(PipelineError::StartHit { .. })));
+        // Shut in by a block that holds the whole arm, it can start nowhere.
+        let shape = Geometry::Box { half_extents: Vector3::repeat(3.0) }.into();
+        let (arm, world) = around(&[Obstacle { shape, ..block }], &job);
+        assert!(matches!(start(&job, &arm, &world), Err(PipelineError::StartHit { .. })));
+    }
+}

@@ -34,6 +34,9 @@ pub struct Plan {
     pub tool: Tool,
     /// The robot's root frame in the floor frame: x, y \[m\], yaw \[rad\].
     pub base: [f64; 3],
+    /// How high above the floor the root frame is: a stand's height. \[m\]
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub base_height: f64,
     /// How the order was found.
     pub method: Method,
     /// What was minimised.
@@ -148,6 +151,7 @@ impl Plan {
             held: Held::all_of(arm),
             tool: tool.clone(),
             base: [0.0; 3],
+            base_height: 0.0,
             method: Method::Tsp,
             cost: CostKind::Effort,
             profile: Profile::Velocity,
@@ -220,7 +224,7 @@ impl Plan {
     #[must_use]
     pub fn base_pose(&self) -> Isometry3<f64> {
         let [x, y, yaw] = self.base;
-        Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * yaw)
+        Isometry3::new(Vector3::new(x, y, self.base_height), Vector3::z() * yaw)
     }
 
     /// How long it takes. \[s\]
@@ -260,6 +264,10 @@ impl Plan {
         let last = Stretch { tool: self.tool.clone(), profile: self.profile, knots };
         self.past.iter().cloned().chain([last]).collect()
     }
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// As many names as a joint vector has lanes, or fewer.

@@ -81,7 +81,7 @@ pub fn build(
     before: Option<&Graph>,
     progress: &dyn Progress,
 ) -> Graph {
-    let Nodes { bed, patches, reached } = nodes;
+    let Nodes { patches, reached, .. } = nodes;
     let pairs = neighbour_pairs(patches, reached, config);
     progress.stage("graph", Some(pairs.len()));
     let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
@@ -89,21 +89,71 @@ pub fn build(
         .par_iter()
         .map(|&(a, b)| {
             let known = before.and_then(|graph| graph.known(a, b));
-            let edge = known.unwrap_or_else(|| {
-                let edge = Edge::between(bed, patches, a, b, config, cell.tool.width)?;
-                let mut turned: Vec<TurnedEdge> =
-                    TURNS.iter().map(|turn| TurnedEdge::new(cell, patches, &edge, *turn)).collect();
-                let even = turned.iter_mut().position(|edge| edge.is_followed(cell, &values));
-                let found =
-                    even.or_else(|| turned.iter().position(|edge| edge.has_detour(cell, &values)))?;
-                Some(turned.swap_remove(found).edge)
-            });
+            let edge = known.unwrap_or_else(|| join(cell, nodes, config, &values, (a, b)));
             progress.tick();
             edge
         })
         .collect();
     let apart = pairs.iter().zip(&tried).filter(|(_, e)| e.is_none()).map(|(p, _)| *p).collect();
     Graph::of(tried.into_iter().flatten().collect(), reached, apart)
+}
+
+/// The edge between two patches, if some branch can be followed along it.
+fn join(
+    cell: Workcell<'_>,
+    nodes: Nodes<'_>,
+    config: &GraphConfig,
+    values: &[f64],
+    (a, b): (usize, usize),
+) -> Option<Edge> {
+    let Nodes { bed, patches, .. } = nodes;
+    let edge = Edge::between(bed, patches, a, b, config, cell.tool.width)?;
+    let mut turned: Vec<TurnedEdge> =
+        TURNS.iter().map(|turn| TurnedEdge::new(cell, patches, &edge, *turn)).collect();
+    let even = turned.iter_mut().position(|edge| edge.is_followed(cell, values));
+    let found = even.or_else(|| turned.iter().position(|edge| edge.has_detour(cell, values)))?;
+    Some(turned.swap_remove(found).edge)
+}
+
+/// How many edges of the graph that [`build`] would give lead on from each patch, counted up to
+/// `enough`: short ones are looked for first, and none where both patches have enough. `None` as soon
+/// as `is_hopeless` is true of what the numbers can still become at most.
+#[must_use]
+pub fn joined(
+    cell: Workcell<'_>,
+    nodes: Nodes<'_>,
+    config: &GraphConfig,
+    enough: usize,
+    is_hopeless: impl Fn(&[usize]) -> bool,
+) -> Option<Vec<usize>> {
+    let Nodes { patches, reached, .. } = nodes;
+    let mut pairs = neighbour_pairs(patches, reached, config);
+    let apart = |&(a, b): &(usize, usize)| (patches[a].centre - patches[b].centre).norm();
+    pairs.sort_by(|x, y| apart(x).total_cmp(&apart(y)).then(x.cmp(y)));
+    let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
+    // Edges of each patch that were found, and that are not ruled out.
+    let (mut found, mut open) = (vec![0; patches.len()], vec![0; patches.len()]);
+    for i in pairs.iter().flat_map(|&(a, b)| [a, b]) {
+        open[i] += 1;
+    }
+    let most = |open: &[usize]| -> Vec<usize> { open.iter().map(|&n| n.min(enough)).collect() };
+    for (a, b) in pairs {
+        if is_hopeless(&most(&open)) {
+            return None;
+        }
+        if found[a] >= enough && found[b] >= enough {
+            continue;
+        }
+        let is_joined = join(cell, nodes, config, &values, (a, b)).is_some();
+        for i in [a, b] {
+            if is_joined {
+                found[i] += 1;
+            } else {
+                open[i] -= 1;
+            }
+        }
+    }
+    Some(most(&found))
 }
 
 /// The graph of the paper's model, between whose nodes no arm is followed: each patch's nearest

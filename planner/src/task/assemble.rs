@@ -51,6 +51,7 @@ pub(super) fn assemble(
     timing::set_times(&mut knots, &cost::velocities(arm, config.v_max));
     Plan {
         base: config.stance.base,
+        base_height: config.stance.height,
         seed: config.seed,
         patches: poses.iter().map(|p| p.translation.vector.into()).collect(),
         surface: poses.iter().map(place).collect(),

@@ -172,6 +172,7 @@ fn assemble(
     };
     Plan {
         base: job.stance.base,
+        base_height: job.stance.height,
         seed: job.seed,
         surface: (0..scan.points.len()).map(sample).collect(),
         ..Plan::of(robot, arm, tool, knots)
@@ -190,7 +191,7 @@ mod tests {
         let job = |to| Transit {
             arm: arm.spec().clone(),
             tool: Tool::default(),
-            stance: Stance { base: [0.0; 3], held: Vec::new() },
+            stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
             from: arm.home(),
             to,
             profile: Profile::Velocity,

@@ -98,7 +98,7 @@ impl Scene {
     #[must_use]
     pub fn around(surface: Scan, scan: &PlacedScan) -> (Self, Vec<Point3<f64>>) {
         let Measured { raw, rest, flying } = measured(scan, &surface);
-        let unseen = unseen::border(scan, &surface);
+        let unseen = unseen::border(scan, &surface, unseen::DEEPEST);
         (Self { surroundings: rest, raw, unseen, ..Self::on_floor(surface) }, flying)
     }
 

@@ -17,6 +17,9 @@ use super::scene::Scene;
 pub struct Stance {
     /// x, y \[m\] and yaw \[rad\] of the root frame in the floor frame.
     pub base: [f64; 3],
+    /// How high above the floor the root frame is: a stand's height. \[m\]
+    #[serde(default)]
+    pub height: f64,
     /// Held joints by name, for instance the torso's height. \[rad\] or \[m\]
     pub held: Vec<(String, f64)>,
 }
@@ -26,7 +29,7 @@ impl Stance {
     #[must_use]
     pub fn pose(&self) -> Isometry3<f64> {
         let [x, y, yaw] = self.base;
-        Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * yaw)
+        Isometry3::new(Vector3::new(x, y, self.height), Vector3::z() * yaw)
     }
 
     /// The arm with this stance's held joints.
@@ -170,7 +173,7 @@ pub fn candidates(
         None => vec![search.held.clone()],
     };
     for held in heights {
-        let bound = Stance { base: [0.0; 3], held: held.clone() }.bind(arm)?;
+        let bound = Stance { base: [0.0; 3], height: 0.0, held: held.clone() }.bind(arm)?;
         let body = body_boxes(robot, &bound);
         for &distance in &search.distances {
             for b in 0..search.bearings {
@@ -184,7 +187,7 @@ pub fn candidates(
                         wrap(turn),
                     ];
                     stances.push((
-                        Stance { base, held: held.clone() },
+                        Stance { base, height: 0.0, held: held.clone() },
                         bound.clone(),
                         body.clone(),
                     ));
@@ -200,7 +203,7 @@ pub fn candidates(
         .par_iter()
         .filter_map(|(stance, arm, body)| {
             let from_floor = stance.pose().inverse();
-            if sparse.iter().any(|p| hits(body, &(from_floor * p))) {
+            if in_the_way(stance, body, &sparse) {
                 return None;
             }
             let reached: usize = judged
@@ -294,6 +297,75 @@ fn extent(link: &Isometry3<f64>, shape: &CollisionShape) -> Option<(Point3<f64>,
     Some((middle - reach, middle + reach))
 }
 
+/// Whether one of the points is where the standing body would be.
+fn in_the_way(
+    stance: &Stance,
+    body: &[(Point3<f64>, Point3<f64>)],
+    points: &[Point3<f64>],
+) -> bool {
+    // No turn takes the body out of this circle.
+    let corner = |(low, high): &(Point3<f64>, Point3<f64>)| {
+        let [x, y] = [0, 1].map(|i| low[i].abs().max(high[i].abs()));
+        x * x + y * y
+    };
+    let reach = body.iter().map(corner).fold(0.0, f64::max);
+    let from_floor = stance.pose().inverse();
+    let [x, y, _] = stance.base;
+    let near = |p: &&Point3<f64>| (p.x - x).powi(2) + (p.y - y).powi(2) <= reach;
+    points.iter().filter(near).any(|p| hits(body, &(from_floor * p)))
+}
+
 fn hits(boxes: &[(Point3<f64>, Point3<f64>)], p: &Point3<f64>) -> bool {
     boxes.iter().any(|(low, high)| (0..3).all(|i| (low[i]..=high[i]).contains(&p[i])))
+}
+
+#[cfg(test)]
+mod tests {
+    use nullsweep_robot::{ArmSpec, Side};
+
+    use super::*;
+
+    #[test]
+    fn the_body_is_all_that_stands_still_and_the_first_link_that_turns_in_place() {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&ArmSpec::pr2(Side::Right)).unwrap();
+        let body = body_boxes(&robot, &arm);
+        let mut poses = vec![Isometry3::identity(); robot.links().len()];
+        arm.link_poses(&arm.home(), &mut poses);
+        // The middle of every shape of a link.
+        let middles = |link: usize| {
+            let shapes = robot.links()[link].collisions.iter();
+            shapes.map(|shape| poses[link] * shape.origin * Point3::origin()).collect::<Vec<_>>()
+        };
+        let first = arm.moving_links()[0];
+        assert!(!middles(first).is_empty());
+        assert!(middles(first).iter().all(|p| hits(&body, p)), "the first link has no place");
+        let shaped = |link: &&usize| !middles(**link).is_empty();
+        let last = *arm.moving_links().iter().rev().find(shaped).expect("a hand");
+        assert_ne!(last, first);
+        assert!(middles(last).iter().all(|p| !hits(&body, p)), "the hand is no body");
+
+        // A point in the first link is in the way of that stance, wherever it stands and turns.
+        for turn in 0..12 {
+            let yaw = 0.55 * f64::from(turn);
+            let stance = Stance { base: [1.3, -0.4, yaw], height: 0.1, held: Vec::new() };
+            let there: Vec<Point3<f64>> =
+                middles(first).iter().map(|p| stance.pose() * p).collect();
+            assert!(in_the_way(&stance, &body, &there));
+            let above: Vec<_> = there.iter().map(|p| p + Vector3::z() * 3.0).collect();
+            assert!(!in_the_way(&stance, &body, &above));
+        }
+        // Whether points are in the way is told as if all of them were looked at.
+        let mut found = 0;
+        for n in 0..4000 {
+            let f = |a: f64| (f64::from(n) * a).fract();
+            let p =
+                Point3::new(3.0 * f(0.819_173) - 1.5, 3.0 * f(0.671_043) - 1.5, 2.0 * f(0.5497));
+            let stance = Stance { base: [0.2, 0.1, 6.0 * f(0.73)], height: 0.0, held: Vec::new() };
+            let wanted = hits(&body, &(stance.pose().inverse() * p));
+            assert_eq!(in_the_way(&stance, &body, &[p]), wanted, "{p}");
+            found += usize::from(wanted);
+        }
+        assert!(found > 100, "{found}");
+    }
 }

@@ -15,13 +15,9 @@ use crate::scan::{PlacedScan, Scan, View};
 
 /// Side of the cells of space. \[m\]
 const CELL: f64 = 0.01;
-/// How deep something may come into what no view has seen: so deep may the sensor be wrong, and so
-/// thin may a thing be. \[m\]
-const DEEPEST: f64 = 0.02;
-/// A place counts as unseen from so far behind what was measured. Of what begins there the first
-/// centre of a cell may lie a whole cell deeper, and half a cell is what robot and tool keep from it.
-/// \[m\]
-const DEPTH: f64 = DEEPEST - 0.5 * CELL;
+/// How deep something may come into what no view has seen, if nothing else is asked for: so deep may
+/// the sensor be wrong, and so thin may a thing be. \[m\]
+pub const DEEPEST: f64 = 0.02;
 /// How far the unseen is looked at around the surface. \[m\]
 const AROUND: f64 = 0.6;
 /// Width of a window: directions are told apart by this angle, and by no less than a few
@@ -32,9 +28,15 @@ const ACROSS: f64 = 2.5;
 
 /// The border of the unseen space around a surface, as centres of cells 1 cm apart; nothing where
 /// no view has a known sensor. Below the floor (z = 0) is no space. \[m\]
+///
+/// What keeps half a cell from these places comes no deeper than `deepest` \[m\] into the unseen; with
+/// 0 not at all, as exactly as cells tell.
 #[must_use]
-pub fn border(scan: &PlacedScan, surface: &Scan) -> Vec<Point3<f64>> {
-    let eyes: Vec<Eye> = scan.views.iter().filter_map(|view| Eye::of(view, surface)).collect();
+pub fn border(scan: &PlacedScan, surface: &Scan, deepest: f64) -> Vec<Point3<f64>> {
+    // Of what begins so deep the first centre of a cell may lie a whole cell deeper.
+    let depth = (deepest - 0.5 * CELL).max(0.0);
+    let eye = |view| Eye::of(view, surface, depth);
+    let eyes: Vec<Eye> = scan.views.iter().filter_map(eye).collect();
     if eyes.is_empty() {
         return Vec::new();
     }
@@ -91,8 +93,9 @@ struct Range {
 }
 
 impl Eye {
-    /// The sensor of a view, if it is known.
-    fn of(view: &View, surface: &Scan) -> Option<Self> {
+    /// The sensor of a view, if it is known; a place counts as unseen from so far behind what was
+    /// measured. \[m\]
+    fn of(view: &View, surface: &Scan, depth: f64) -> Option<Self> {
         let at = view.sensor?;
         let mean: Vector3<f64> = view.points.iter().map(|p| (p - at).normalize()).sum();
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &mean)?;
@@ -127,7 +130,7 @@ impl Eye {
             let nothing = Range { nearest: f32::INFINITY, hidden: f32::INFINITY };
             around.fold(nothing, |range, (least, most)| Range {
                 nearest: range.nearest.min(least),
-                hidden: range.hidden.min(most + DEPTH as f32),
+                hidden: range.hidden.min(most + depth as f32),
             })
         };
         eye.sight = (0..seen.len()).map(range).collect();
@@ -208,6 +211,8 @@ mod tests {
 
     use super::*;
 
+    const DEPTH: f64 = DEEPEST - 0.5 * CELL;
+
     /// A plate of 40 × 40 cm at height 1 m over the origin, seen from a place.
     fn plate(sensor: Option<Point3<f64>>) -> (View, Scan) {
         let points: Vec<Point3<f64>> = (0..10_000)
@@ -229,7 +234,7 @@ mod tests {
     #[test]
     fn behind_a_plate_is_unseen_and_beside_it_is_not() {
         let (view, surface) = plate(Some(Point3::new(0.0, 0.0, 2.0)));
-        let eye = [Eye::of(&view, &surface).unwrap()];
+        let eye = [Eye::of(&view, &surface, DEPTH).unwrap()];
         assert!(is_unseen(&eye, &Point3::new(0.05, 0.05, 0.9)));
         assert!(is_unseen(&eye, &Point3::new(0.25, 0.0, 0.7)), "the shadow widens");
         assert!(!is_unseen(&eye, &Point3::new(0.05, 0.05, 0.99)), "as thin as that may be seen");
@@ -237,7 +242,7 @@ mod tests {
         assert!(!is_unseen(&eye, &Point3::new(0.3, 0.0, 0.9)));
         // A second sensor below looks through it.
         let (below, _) = plate(Some(Point3::new(0.0, 0.0, 0.2)));
-        let both = [&view, &below].map(|view| Eye::of(view, &surface).unwrap());
+        let both = [&view, &below].map(|view| Eye::of(view, &surface, DEPTH).unwrap());
         assert!(!is_unseen(&both, &Point3::new(0.05, 0.05, 0.9)));
         assert!(!is_unseen(&both, &Point3::new(0.05, 0.05, 1.1)));
     }
@@ -249,7 +254,7 @@ mod tests {
             let (mut view, surface) = plate(Some(Point3::new(0.0, 0.0, 3.0)));
             let cut = -0.1 + 0.001 * f64::from(step);
             view.points.retain(|p| p.x <= cut);
-            let eye = [Eye::of(&view, &surface).unwrap()];
+            let eye = [Eye::of(&view, &surface, DEPTH).unwrap()];
             let edge = view.points.iter().map(|p| p.x).fold(f64::MIN, f64::max);
             let beside = |share: f64| {
                 let tangent = ((edge / 2.0).atan() + share * WINDOW).tan();
@@ -263,7 +268,7 @@ mod tests {
     #[test]
     fn the_border_encloses_the_shadow() {
         let (view, surface) = plate(Some(Point3::new(0.0, 0.0, 2.0)));
-        let border = border(&PlacedScan { views: vec![view] }, &surface);
+        let border = border(&PlacedScan { views: vec![view] }, &surface, DEEPEST);
         let near = |p: Point3<f64>| border.iter().any(|b| (b - p).norm() < 0.02);
         assert!(near(Point3::new(0.0, 0.0, 0.97)), "right behind the plate");
         assert!(near(Point3::new(0.3, 0.0, 0.5)), "the side of the shadow");
@@ -272,8 +277,23 @@ mod tests {
     }
 
     #[test]
+    fn what_may_not_come_into_the_shadow_at_all_is_kept_right_behind_what_was_measured() {
+        let (view, surface) = plate(Some(Point3::new(0.0, 0.0, 2.0)));
+        let scan = PlacedScan { views: vec![view] };
+        // What keeps half a cell from the border comes so deep under the plate's middle.
+        let deepest = |may: f64| {
+            let border = border(&scan, &surface, may);
+            let under = border.iter().filter(|p| p.x.hypot(p.y) < 0.1);
+            1.0 - under.map(|p| p.z).fold(0.0, f64::max) - 0.5 * CELL
+        };
+        let (forbidden, avoided) = (deepest(0.0), deepest(DEEPEST));
+        assert!((-0.5 * CELL..=0.5 * CELL).contains(&forbidden), "{forbidden} m");
+        assert!((DEEPEST - 1.5 * CELL..=DEEPEST).contains(&avoided), "{avoided} m");
+    }
+
+    #[test]
     fn a_scan_without_a_sensor_hides_nothing() {
         let (view, surface) = plate(None);
-        assert!(border(&PlacedScan { views: vec![view] }, &surface).is_empty());
+        assert!(border(&PlacedScan { views: vec![view] }, &surface, DEEPEST).is_empty());
     }
 }

@@ -35,7 +35,7 @@ pub(crate) fn stage() -> &'static Stage {
         // The spoilt postures were made for a place that the simulated camera has not seen.
         scene.unseen.clear();
         let held = vec![("torso_lift_joint".to_owned(), 0.1)];
-        let stance = Stance { base: [-0.04, 0.574, 5.607], held };
+        let stance = Stance { base: [-0.04, 0.574, 5.607], height: 0.0, held };
         let to_root = stance.pose().inverse();
         let job = Job {
             stance: StanceChoice::Given(stance),

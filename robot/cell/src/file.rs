@@ -72,7 +72,7 @@ pub struct Scene {
     pub support_height: Option<f64>,
     /// Size of the table's top. \[m\]
     pub table: Option<[f64; 2]>,
-    /// What unseen space is: `avoid` or `free`.
+    /// What unseen space is: `avoid`, `forbid` or `free`.
     pub unseen: Option<String>,
     /// Factor from the files' unit to metres.
     pub scale: Option<f64>,

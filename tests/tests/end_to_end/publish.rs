@@ -42,6 +42,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         held: Held::all_of(arm),
         tool,
         base: [0.0; 3],
+        base_height: 0.0,
         method: Method::Tsp,
         cost: CostKind::Time,
         profile: Profile::Velocity,

@@ -26,7 +26,9 @@ pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
     let Some(plan) = sitter.plans.last() else { return Ok(ReportData::default()) };
     for other in sitter.plans {
         ensure!(
-            other.base == plan.base && other.joints == plan.joints && other.held == plan.held,
+            other.base_pose() == plan.base_pose()
+                && other.joints == plan.joints
+                && other.held == plan.held,
             "the plans are not of one stance: the robot stands at {:?} in one, at {:?} in another, \
              or other joints are moved or held",
             other.base,

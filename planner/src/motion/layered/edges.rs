@@ -3,7 +3,7 @@
 /// Jumps made between two layers after which the others are put off: they are expensive, and their cost
 /// hardly depends on the sample.
 const MAX_JUMPS: usize = 3;
-/// Failed jumps between two layers after which one of them is left out.
+/// Failed jumps between two layers, no two of them alike, after which one of the layers is left out.
 const MAX_FAILED_JUMPS: usize = 12;
 /// How much longer a doubtful motion is taken to be, before one was made.
 const DOUBT: f32 = 1.2;

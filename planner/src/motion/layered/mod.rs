@@ -78,6 +78,14 @@ pub trait Moves: Sync {
     /// Whether the tool can be lifted off at a sample: without that no jump begins or ends there.
     fn lifts(&self, at: &Sample) -> bool;
 
+    /// Whether the arm comes to a sample through free space from the source. Where it does not, jumps to
+    /// it are not to be hoped for: all that is visited hangs together with the source.
+    fn is_joined(&self, at: &Sample) -> bool;
+
+    /// Whether two samples are so near each other in all but how the pad is turned that what keeps jumps
+    /// from one keeps them from the other.
+    fn are_alike(&self, a: &Sample, b: &Sample) -> bool;
+
     /// An estimate of a jump's cost from that of its straight joint line, not above the truth.
     fn jump_estimate(&self, straight: f64) -> f64;
 }
@@ -204,6 +212,8 @@ struct Search<'a, C, M> {
     labels: Vec<Vec<(f32, u32)>>,
     /// For each layer where a sample turned out not to, which samples the tool can be lifted off at.
     lifts: Vec<Option<Vec<bool>>>,
+    /// Samples that are not joined to the source, no two of them alike.
+    shut: Vec<Sample>,
 }
 
 impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
@@ -213,7 +223,7 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
             .map(|p| problem.edges(p.checked_sub(1).map(|b| visited[b]), visited[p]))
             .collect();
         let lifts = vec![None; problem.layers.len()];
-        Self { problem, visited, into, labels: Vec::new(), lifts }
+        Self { problem, visited, into, labels: Vec::new(), lifts, shut: Vec::new() }
     }
 
     /// Whether the tool can be lifted off at a sample. Where it cannot, all samples of its layer are
@@ -230,31 +240,63 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
         lifts
     }
 
+    /// Whether a sample is like one that is not joined to the source.
+    fn is_shut(&self, at: &Sample) -> bool {
+        self.shut.iter().any(|shut| self.problem.moves.are_alike(shut, at))
+    }
+
+    /// Whether a sample, between which and another a jump failed, is not joined to the source.
+    fn shuts(&mut self, (layer, sample): (usize, usize)) -> bool {
+        let at = self.problem.layers[layer][sample];
+        self.is_shut(&at) || {
+            let is_joined = self.problem.moves.is_joined(&at);
+            self.shut.extend((!is_joined).then_some(at));
+            !is_joined
+        }
+    }
+
     /// After a jump into place `p` that failed: gives up those that would fail for the same reason;
     /// whether the others are given up too.
     fn strike(&mut self, p: usize, key: &Key) -> bool {
         let from = key.from.is_none_or(|from| self.lifts(from));
         let to = self.lifts(key.to);
+        // What is shut in says nothing of the other end.
+        let is_shut = to && self.shuts(key.to) || from && key.from.is_some_and(|k| self.shuts(k));
+        let Problem { layers, moves, .. } = self.problem;
+        let like = |(layer, sample): (usize, usize)| -> Vec<bool> {
+            let failed = &layers[layer][sample];
+            layers[layer].iter().map(|other| moves.are_alike(failed, other)).collect()
+        };
+        let (like_from, like_to) = (key.from.map(like), like(key.to));
+        let shut = |layer: usize| layers[layer].iter().map(|at| self.is_shut(at)).collect();
+        let shut_from: Option<Vec<bool>> = key.from.map(|(layer, _)| shut(layer));
+        let shut_to: Vec<bool> = shut(key.to.0);
         let off = |layer: Option<usize>| layer.and_then(|layer| self.lifts[layer].as_ref());
         let (rows, columns) = (off(key.from.map(|(layer, _)| layer)), off(Some(key.to.0)));
         let edges = &mut self.into[p];
         edges.close_jumps(|row, column| {
-            rows.is_some_and(|lifts| !lifts[row]) || columns.is_some_and(|lifts| !lifts[column])
+            let is_like = like_to[column] && like_from.as_ref().is_none_or(|like| like[row]);
+            is_like
+                || shut_to[column]
+                || shut_from.as_ref().is_some_and(|shut| shut[row])
+                || rows.is_some_and(|lifts| !lifts[row])
+                || columns.is_some_and(|lifts| !lifts[column])
         });
-        edges.strike(from && to)
+        edges.strike(from && to && !is_shut)
     }
 
     /// Leaves out the layer at place `p`, into which no motion leads; or the one before it, if no
     /// jump can begin there. The layer that was left out.
     fn give_up(&mut self, p: usize) -> usize {
         let is_trap = |before: usize| {
-            let lifts = self.lifts[self.visited[before]].as_ref();
-            lifts.is_some_and(|lifts| {
-                lifts
-                    .iter()
-                    .zip(&self.labels[before])
-                    .all(|(lifts, (cost, _))| !lifts || cost.is_infinite())
-            })
+            let layer = self.visited[before];
+            let lifts = self.lifts[layer].as_ref();
+            let stays = |sample: usize, at: &Sample| {
+                lifts.is_some_and(|lifts| !lifts[sample]) || self.is_shut(at)
+            };
+            let samples = self.problem.layers[layer].iter().zip(&self.labels[before]);
+            let mut samples = samples.enumerate();
+            samples.all(|(i, (at, (cost, _)))| cost.is_infinite() || stays(i, at))
         };
         let place = p.checked_sub(1).filter(|&before| is_trap(before)).unwrap_or(p);
         let layer = self.visited[place];
@@ -340,6 +382,7 @@ impl<'a, C: Cost, M: Moves> Search<'a, C, M> {
             (Link::Surface { edge, reversed }, Kind::Doubtful) => {
                 moves.around((edge, reversed), from, to).ok_or(None)
             }
+            _ if self.is_shut(from) || self.is_shut(to) => Err(None),
             _ => moves.jump(Some(from), to).ok_or(None),
         }
     }

@@ -1,3 +1,5 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use nullsweep_robot::Branch;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -46,6 +48,12 @@ impl Moves for Hidden {
     }
     fn lifts(&self, _: &Sample) -> bool {
         true
+    }
+    fn is_joined(&self, _: &Sample) -> bool {
+        true
+    }
+    fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
+        a == b
     }
     fn jump_estimate(&self, straight: f64) -> f64 {
         2.0 + 1.5 * straight
@@ -169,6 +177,12 @@ impl Moves for Gates {
     fn lifts(&self, _: &Sample) -> bool {
         true
     }
+    fn is_joined(&self, _: &Sample) -> bool {
+        true
+    }
+    fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
+        a == b
+    }
     fn jump_estimate(&self, straight: f64) -> f64 {
         1.0 + straight
     }
@@ -234,6 +248,12 @@ impl Moves for Trap {
     fn lifts(&self, at: &Sample) -> bool {
         at.heading != 1.0
     }
+    fn is_joined(&self, _: &Sample) -> bool {
+        true
+    }
+    fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
+        a == b
+    }
     fn jump_estimate(&self, straight: f64) -> f64 {
         1.0 + straight
     }
@@ -253,5 +273,71 @@ fn the_layer_that_no_jump_leaves_is_left_out_not_those_behind_it() {
             left_out.push(l)
         });
         assert_eq!((path.layers, left_out), (vec![0, 2, 3, 4], vec![1]));
+    }
+}
+
+/// No jump leads into the second layer; counts those that are asked for.
+struct Wall(AtomicUsize);
+
+impl Moves for Wall {
+    type Path = ();
+    fn link(&self, _: usize, _: usize) -> Link {
+        Link::Jump
+    }
+    fn track(&self, _: (usize, bool), _: &Sample, _: &Sample) -> Result<Motion<()>, Blocked> {
+        unreachable!("no layers are linked along the surface")
+    }
+    fn around(&self, _: (usize, bool), _: &Sample, _: &Sample) -> Option<Motion<()>> {
+        unreachable!("no layers are linked along the surface")
+    }
+    fn jump(&self, from: Option<&Sample>, to: &Sample) -> Option<Motion<()>> {
+        let Some(from) = from else {
+            return Some(Motion { cost: straight(&JointVector::ZERO, &to.q), path: () });
+        };
+        if to.heading == 1.0 {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            return None;
+        }
+        Some(Motion { cost: straight(&from.q, &to.q), path: () })
+    }
+    fn lifts(&self, _: &Sample) -> bool {
+        true
+    }
+    fn is_joined(&self, _: &Sample) -> bool {
+        true
+    }
+    fn are_alike(&self, a: &Sample, b: &Sample) -> bool {
+        a.branch == b.branch
+    }
+    fn jump_estimate(&self, straight: f64) -> f64 {
+        straight
+    }
+}
+
+#[test]
+fn a_jump_that_fails_is_not_tried_again_between_samples_that_are_alike() {
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    for _ in 0..50 {
+        // Six samples a layer, of two kinds: thirty-six jumps, of four kinds.
+        let layers: Vec<Vec<Sample>> = (0..3)
+            .map(|layer| {
+                let sample = |k: u8| {
+                    let mut q = JointVector::ZERO;
+                    q[..3].fill_with(|| rng.random_range(-2.0..2.0));
+                    let (branch, heading) = (Branch(k % 2), f64::from(layer));
+                    Sample { q, branch, redundancy: 0.0, heading }
+                };
+                (0..6).map(sample).collect()
+            })
+            .collect();
+        let wall = Wall(AtomicUsize::new(0));
+        let mut left_out = Vec::new();
+        let source = JointVector::ZERO;
+        let path = shortest(&Effort, Continuous::default(), &source, &layers, &wall, &mut |l| {
+            left_out.push(l)
+        });
+        assert_eq!((path.layers, left_out), (vec![0, 2], vec![1]));
+        let tried = wall.0.into_inner();
+        assert!((1..=4).contains(&tried), "{tried} jumps tried");
     }
 }

@@ -1,0 +1,94 @@
+//! Whether the arm would come to what a plan leaves out from another stance that was tried.
+
+use nullsweep_robot::{Arm, Robot};
+use nullsweep_surface::Patch;
+use serde::{Deserialize, Serialize};
+
+use super::error::PipelineError;
+use super::job::Job;
+use super::left_out::LeftOut;
+use super::setting::Setting;
+use crate::workcell::stance::{Stance, told};
+use crate::workcell::{Cause, Scene, reach};
+
+/// A stance that was tried, and which patches it reaches in a sketch of the scene.
+pub(super) struct Other {
+    pub(super) stance: Stance,
+    pub(super) reached: Vec<bool>,
+}
+
+/// Patches that are free from another stance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FreeFrom {
+    /// The stance.
+    #[serde(flatten)]
+    pub stance: Stance,
+    /// How many of those that are left out.
+    pub patches: usize,
+}
+
+impl std::fmt::Display for FreeFrom {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "from base {}", told(&self.stance.base))?;
+        for (joint, value) in &self.stance.held {
+            write!(f, ", {joint} {value}")?;
+        }
+        match self.patches {
+            1 => f.write_str(" 1 patch is free"),
+            n => write!(f, " {n} patches are free"),
+        }
+    }
+}
+
+/// What a stance is looked at in: scene and patches in the floor frame.
+pub(super) struct Floor<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) arm: &'a Arm,
+    pub(super) scene: &'a Scene,
+    pub(super) patches: &'a [Patch],
+    pub(super) job: &'a Job,
+}
+
+/// Says in the rows of what the arm meets something at how much of it is free from the one other stance
+/// that promises most: what it reaches of it among all that is there.
+pub(super) fn advise(
+    rows: &mut [LeftOut],
+    others: &[Other],
+    floor: &Floor<'_>,
+) -> Result<(), PipelineError> {
+    let Floor { robot, arm, scene, patches, job } = *floor;
+    let blocked: Vec<usize> =
+        rows.iter().filter(|row| meets(&row.cause)).flat_map(|row| row.of.clone()).collect();
+    let promises = |other: &Other| -> usize {
+        let free = blocked.iter().filter(|&&patch| other.reached[patch]);
+        free.map(|&patch| patches[patch].points.len().max(1)).sum()
+    };
+    // The first of those that are alike: they come best first.
+    let best = others.iter().rev().max_by_key(|other| promises(other));
+    let Some(best) = best.filter(|other| promises(other) > 0) else { return Ok(()) };
+    let setting = Setting::new(robot, arm, scene, patches, job, best.stance.clone())?;
+    if !setting.can_stand(job) {
+        return Ok(());
+    }
+    let promised: Vec<usize> = blocked.into_iter().filter(|&patch| best.reached[patch]).collect();
+    let looked: Vec<Patch> = promised.iter().map(|&patch| setting.patches[patch].clone()).collect();
+    let reached = reach(setting.cell(job), &looked, job.ik_samples, &|| ());
+    let is_free = |patch: &usize| {
+        let place = promised.iter().position(|other| other == patch);
+        place.is_some_and(|place| reached[place].is_some())
+    };
+    for row in rows.iter_mut().filter(|row| meets(&row.cause)) {
+        let patches = row.of.iter().filter(|patch| is_free(patch)).count();
+        let stance = best.stance.clone();
+        row.free_from = (patches > 0).then_some(FreeFrom { stance, patches });
+    }
+    Ok(())
+}
+
+/// Whether something is in the arm's way.
+fn meets(cause: &Cause) -> bool {
+    matches!(
+        cause,
+        Cause::Itself { .. } | Cause::Solid { .. } | Cause::Object { .. } | Cause::Unseen { .. }
+    )
+}
