@@ -8,7 +8,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options};
 use nullsweep_planner::plan::Profile;
 use nullsweep_planner::progress::Silent;
-use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome, Tolerance};
+use nullsweep_planner::poses::{self, ReadOptions, Tolerance};
+use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome};
+use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
 use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::{ArmSpec, Geometry, Robot, Side, Tool};
@@ -17,13 +19,12 @@ fn config(tolerance: Tolerance) -> TaskConfig {
     TaskConfig {
         arm: ArmSpec::pr2(Side::Right),
         // Poses of the gripper's tool frame, its x axis ahead.
-        tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
+        tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
         tolerance,
         stance: Stance { base: [0.0; 3], held: Vec::new() },
         start: None,
-        profile: Profile::Velocity,
+        speed: Speed::default(),
         collision: Options::default(),
-        v_max: None,
         rounds: 2,
         trials: 10,
         seed: 1,
@@ -89,11 +90,11 @@ fn the_wok_takes_less_than_forty_radians() {
         println!("skipped: {} is not there", data.display());
         return;
     }
-    let poses = task::read(&data.join("ur5_20240819_164816_wok.csv")).unwrap().poses;
+    let poses = poses::read(&data.join("ur5_20240819_164816_wok.csv"), &ReadOptions::default()).unwrap().all();
     let robot = Robot::from_urdf_file(&data.join("ur5.urdf")).unwrap();
     let config = TaskConfig {
         arm: ArmSpec { base: "base_link".into(), tip: "tool_tip".into() },
-        tool: task::tip_tool(),
+        tool: poses::tip_tool(),
         collision: Options { fit_capsules: Some(0.05), ..Options::default() },
         ..config("0.05,0.05,0,0,0,free".parse().unwrap())
     };
@@ -167,7 +168,7 @@ fn a_task_begins_where_the_arm_is_and_keeps_its_accelerations() {
     let start = arm.home();
     let from_home = TaskConfig {
         start: Some(start),
-        profile: Profile::Acceleration,
+        speed: Speed { profile: Profile::Acceleration, ..Speed::default() },
         ..config(Tolerance::AXIS)
     };
     let outcome = task::run(&robot, &common::dome(), &nothing(), &from_home, &Silent).unwrap();

@@ -62,7 +62,9 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
         let choice = swept.map_or_else(|| args.scene.clone(), |point| args.scene.or_at(point));
         scene(&choice, None, std::slice::from_ref(file), seed, &bars)?
     } else if args.demo.is_none() && args.scans.is_empty() {
-        Scene::empty()
+        let mut floor = Scene::empty();
+        floor.obstacles.extend(args.scene.obstacles()?);
+        floor
     } else {
         scene(&args.scene, args.demo, &args.scans, seed, &bars)?
     };

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use nullsweep_robot::JointVector;
 
-use super::space::{Point, Space};
+use crate::poses::{Point, Space};
 
 /// Poses in the order in which they are visited, and the joint vector at each.
 #[derive(Clone, Debug)]
@@ -97,8 +97,13 @@ impl Task<'_> {
     /// suit the new place; returns what is gained. \[rad\]
     pub(super) fn reinsert(&self, route: &mut Route) -> f64 {
         let mut gained = 0.0;
+        let mut place = vec![usize::MAX; self.poses.len()];
+        route.order.iter().enumerate().for_each(|(k, &pose)| place[pose] = k);
         for pose in 0..self.poses.len() {
-            let Some(at) = route.order.iter().position(|&p| p == pose) else { continue };
+            let at = place[pose];
+            if at == usize::MAX {
+                continue;
+            }
             let point =
                 |k: Option<usize>| k.and_then(|k| route.order.get(k)).map(|&p| route.points[p]);
             let (before, after) = (point(at.checked_sub(1)), point(Some(at + 1)));
@@ -111,15 +116,16 @@ impl Task<'_> {
             if saved < 1e-3 {
                 continue;
             }
-            let mut rest = route.order.clone();
-            rest.remove(at);
+            // Places are those of the order without this pose.
+            let rest = |k: usize| point(Some(k + usize::from(k >= at)));
             let mut best: Option<(f64, usize, Point)> = None;
             for &other in self.near[pose].iter().take(BESIDE) {
-                let Some(beside) = rest.iter().position(|&p| p == other) else { continue };
-                for place in [beside, beside + 1] {
-                    let point =
-                        |k: Option<usize>| k.and_then(|k| rest.get(k)).map(|&p| route.points[p]);
-                    let (a, b) = (point(place.checked_sub(1)), point(Some(place)));
+                if place[other] == usize::MAX {
+                    continue;
+                }
+                let beside = place[other] - usize::from(place[other] > at);
+                for k in [beside, beside + 1] {
+                    let (a, b) = (k.checked_sub(1).and_then(rest), rest(k));
                     let start = match (&a, &b) {
                         (Some(a), Some(b)) => JointVector::from_fn(|j| 0.5 * (a.q[j] + b.q[j])),
                         (Some(one), None) | (None, Some(one)) => one.q,
@@ -130,13 +136,16 @@ impl Task<'_> {
                     if cost < best.as_ref().map_or(saved - 1e-6, |b| b.0)
                         && self.space.is_free(&new)
                     {
-                        best = Some((cost, place, new));
+                        best = Some((cost, k, new));
                     }
                 }
             }
-            if let Some((cost, place, new)) = best {
-                rest.insert(place, pose);
-                route.order = rest;
+            if let Some((cost, to, new)) = best {
+                route.order.remove(at);
+                route.order.insert(to, pose);
+                for k in at.min(to)..=at.max(to) {
+                    place[route.order[k]] = k;
+                }
                 route.points[pose] = new;
                 gained += saved - cost;
             }
