@@ -31,7 +31,7 @@ pub struct FollowFigures {
     pub effort_rad: f64,
     /// Duration of the plan. \[s\]
     pub task_time_s: f64,
-    /// Farthest of any pose from being met by the timed motion, from its knots alone: place, beyond the
+    /// Farthest that the timed motion passes by any pose, from its knots alone: place, beyond the
     /// tolerance. \[m\]
     pub position_error_max_m: f64,
     /// The same of its axes. \[rad\]

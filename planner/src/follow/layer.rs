@@ -39,7 +39,7 @@ pub(super) struct Density {
 }
 
 /// Of a first look, and where it found no way on.
-pub(super) const COARSE: Density = Density { apart: 0.2, spread: 48, most: 240 };
+pub(super) const COARSE: Density = Density { apart: 0.15, spread: 48, most: 240 };
 pub(super) const FINE: Density = Density { apart: 0.1, spread: 240, most: 600 };
 
 /// Adds joint vectors that meet a pose, free of collision: first those that follow from others nearby,

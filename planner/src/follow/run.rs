@@ -219,12 +219,43 @@ fn figures(
         step_max_m: along.step[1],
         ..FollowFigures::default()
     };
-    for knot in &plan.knots {
-        let Some(pose) = knot.patch.and_then(|pose| poses.get(pose as usize)) else { continue };
-        let excess = space.excess(pose, &space.point(knot.q).tool);
-        let (place, turn) = (excess.fixed_rows::<3>(0).norm(), excess.fixed_rows::<3>(3).norm());
-        figures.position_error_max_m = figures.position_error_max_m.max(place);
-        figures.angle_error_max_rad = figures.angle_error_max_rad.max(turn);
-    }
+    let errors: Vec<(f64, f64)> = (0..plan.knots.len())
+        .into_par_iter()
+        .filter_map(|k| {
+            let pose = plan.knots[k].patch.and_then(|pose| poses.get(pose as usize))?;
+            Some(passed(space, pose, plan, k))
+        })
+        .collect();
+    figures.position_error_max_m = errors.iter().map(|e| e.0).fold(0.0, f64::max);
+    figures.angle_error_max_rad = errors.iter().map(|e| e.1).fold(0.0, f64::max);
     figures
+}
+
+/// Curves about a knot on which the tool may pass the knot's pose.
+const ABOUT: usize = 3;
+/// Looks on a curve, and how often about the best one again.
+const LOOKS: i32 = 8;
+const AGAIN: i32 = 4;
+
+/// How near the motion passes a pose about a knot: place \[m\] and axes \[rad\], beyond the tolerance.
+fn passed(space: &Space<'_>, pose: &Isometry3<f64>, plan: &Plan, knot: usize) -> (f64, f64) {
+    let off = |q: JointVector| {
+        let excess = space.excess(pose, &space.point(q).tool);
+        (excess.fixed_rows::<3>(0).norm(), excess.fixed_rows::<3>(3).norm())
+    };
+    let nearer = |a: (f64, f64), b: (f64, f64)| if b.0 < a.0 { b } else { a };
+    let curves = knot.saturating_sub(ABOUT).max(1)..(knot + ABOUT + 1).min(plan.knots.len());
+    curves.fold(off(plan.knots[knot].q), |best, k| {
+        let curve = plan.curve(k);
+        let (mut middle, mut width, mut here) = (0.5, 0.5, (f64::INFINITY, f64::INFINITY));
+        for _ in 0..AGAIN {
+            let share = |i: i32| (middle + width * f64::from(i) / f64::from(LOOKS)).clamp(0.0, 1.0);
+            let looks = (-LOOKS..=LOOKS).map(|i| (share(i), off(curve.at(share(i)))));
+            let found = looks.reduce(|a, b| if b.1.0 < a.1.0 { b } else { a });
+            let Some((at, error)) = found else { break };
+            (middle, here) = (at, nearer(here, error));
+            width /= f64::from(LOOKS);
+        }
+        nearer(best, here)
+    })
 }

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::config::TaskConfig;
 use super::error::TaskError;
-use super::route::{PENALTY, Route, Task};
+use super::route::{PENALTY, Route, Task, Unsettled};
 use crate::poses::{Point, Space, Unmet};
 use crate::progress::Progress;
 
@@ -147,13 +147,14 @@ fn rescue(task: &Task<'_>, choices: &mut [Vec<Point>]) -> Vec<(usize, Unmet)> {
 
 /// Relaxes the route and moves poses until neither gains.
 fn settle(task: &Task<'_>, route: &mut Route) {
+    let mut open = Unsettled::all(task.poses.len());
     for _ in 0..12 {
-        task.relax(route, SWEEPS);
-        if task.reinsert(route) < 1e-3 {
+        task.relax(route, &mut open, SWEEPS);
+        if task.reinsert(route, &mut open) < 1e-3 {
             break;
         }
     }
-    task.relax(route, 4 * SWEEPS);
+    task.relax(route, &mut open, 4 * SWEEPS);
 }
 
 /// For each pose the others, nearest first.
