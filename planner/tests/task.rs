@@ -7,8 +7,8 @@ use std::path::Path;
 use nalgebra::{Isometry3, Point3, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options};
 use nullsweep_planner::plan::Profile;
-use nullsweep_planner::progress::Silent;
 use nullsweep_planner::poses::{self, ReadOptions, Tolerance};
+use nullsweep_planner::progress::Silent;
 use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome};
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
@@ -90,7 +90,9 @@ fn the_wok_takes_less_than_forty_radians() {
         println!("skipped: {} is not there", data.display());
         return;
     }
-    let poses = poses::read(&data.join("ur5_20240819_164816_wok.csv"), &ReadOptions::default()).unwrap().all();
+    let poses = poses::read(&data.join("ur5_20240819_164816_wok.csv"), &ReadOptions::default())
+        .unwrap()
+        .all();
     let robot = Robot::from_urdf_file(&data.join("ur5.urdf")).unwrap();
     let config = TaskConfig {
         arm: ArmSpec { base: "base_link".into(), tip: "tool_tip".into() },

@@ -138,7 +138,9 @@ fn follow(error: &FollowError) -> Option<String> {
     match error {
         FollowError::NothingMet { .. } => Some(NOTHING_MET.into()),
         FollowError::StanceHit { .. } => Some(STANDS_IN.into()),
-        FollowError::Start { .. } | FollowError::NoWay { .. } => Some("give another --start".into()),
+        FollowError::Start { .. } | FollowError::NoWay { .. } => {
+            Some("give another --start".into())
+        }
         FollowError::Collision(error) => collision(error),
         _ => None,
     }

@@ -39,8 +39,7 @@ pub(super) fn run(args: &FollowArgs) -> anyhow::Result<u8> {
         collision: given.robot.collision(),
         seed: given.seed,
     };
-    let outcome =
-        follow::run(&setting.robot, &setting.segments, &setting.scene, &config, &bars);
+    let outcome = follow::run(&setting.robot, &setting.segments, &setting.scene, &config, &bars);
     bars.clear();
     let outcome = outcome?;
     for note in &outcome.figures.notes {
@@ -54,11 +53,8 @@ pub(super) fn run(args: &FollowArgs) -> anyhow::Result<u8> {
 fn rows(f: &FollowFigures) -> Vec<[String; 2]> {
     let mm = |metres: f64| format!("{:.3}", metres * 1e3);
     let deviation = format!("{}, {} mm", mm(f.edge_deviation_p90_m), mm(f.edge_deviation_max_m));
-    let error = format!(
-        "{} mm, {:.3}°",
-        mm(f.position_error_max_m),
-        f.angle_error_max_rad.to_degrees()
-    );
+    let error =
+        format!("{} mm, {:.3}°", mm(f.position_error_max_m), f.angle_error_max_rad.to_degrees());
     let step = format!("{:.2}°, {} mm", f.step_max_rad.to_degrees(), mm(f.step_max_m));
     let sampled = format!(
         "{:.2} rad, over {} joint vectors at {} places",

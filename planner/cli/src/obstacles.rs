@@ -64,7 +64,13 @@ fn parse(text: &str) -> anyhow::Result<Vec<Obstacle>> {
     let mut all = Vec::new();
     for b in file.boxes {
         let half_extents = Vector3::from(b.size) * 0.5;
-        all.push((b.name, "box", (b.centre, b.rpy), Geometry::Box { half_extents }, b.size.to_vec()));
+        all.push((
+            b.name,
+            "box",
+            (b.centre, b.rpy),
+            Geometry::Box { half_extents },
+            b.size.to_vec(),
+        ));
     }
     for c in file.cylinders {
         let shape = Geometry::Cylinder { radius: c.radius, half_length: 0.5 * c.height };

@@ -162,7 +162,8 @@ fn switched(of: &Givens<'_>, p: usize, come: &[Label]) -> Vec<Label> {
         return leave;
     }
     let nodes = &of.layers[p].nodes;
-    let Some(fewest) = come.iter().map(|l| l.cost).filter(|c| c.is_some()).map(|c| c.0).min() else {
+    let Some(fewest) = come.iter().map(|l| l.cost).filter(|c| c.is_some()).map(|c| c.0).min()
+    else {
         return leave;
     };
     for (k, label) in leave.iter_mut().enumerate() {

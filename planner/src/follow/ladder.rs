@@ -327,7 +327,8 @@ impl<'a> Ladder<'a> {
         if !matches!(self.links[p], Link::Track(_)) {
             // Through free space nothing comes there: the rest of the segment is left out.
             let segment = self.layers[p].segment;
-            let behind = self.layers[p..].iter().take_while(|layer| layer.segment == segment).count();
+            let behind =
+                self.layers[p..].iter().take_while(|layer| layer.segment == segment).count();
             self.layers.drain(p..p + behind);
             self.links.drain(p..p + behind);
             if p < self.layers.len() {

@@ -98,8 +98,8 @@ impl Grid {
             known.into_iter().any(|&k| nodes[k].q.distance(&point.q) <= self.apart)
         };
         let around = -1..=1;
-        !around.clone().any(|i| {
-            around.clone().any(|j| around.clone().any(|k| near([x + i, y + j, z + k])))
-        })
+        !around
+            .clone()
+            .any(|i| around.clone().any(|j| around.clone().any(|k| near([x + i, y + j, z + k]))))
     }
 }

@@ -159,12 +159,7 @@ fn dense(problem: &Problem<'_>, run: &[(Station, Point)]) -> Vec<Stop> {
 }
 
 /// Tells which poses are left out, and why.
-fn tell(
-    space: &Space<'_>,
-    poses: &[Isometry3<f64>],
-    pieces: &[Piece],
-    progress: &dyn Progress,
-) {
+fn tell(space: &Space<'_>, poses: &[Isometry3<f64>], pieces: &[Piece], progress: &dyn Progress) {
     let mut met = vec![false; poses.len()];
     for piece in pieces {
         let Piece::Along(stops) = piece else { continue };
@@ -200,8 +195,7 @@ fn figures(
 ) -> FollowFigures {
     let along = Along::of(space, poses, pieces);
     let joints: Vec<JointVector> = plan.knots.iter().map(|k| k.q).collect();
-    let reconfigures =
-        |part: &&Part| matches!(part, Part::Way { reconfigures: true, .. });
+    let reconfigures = |part: &&Part| matches!(part, Part::Way { reconfigures: true, .. });
     let mut figures = FollowFigures {
         poses: poses.len(),
         met: along.met,

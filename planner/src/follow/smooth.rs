@@ -81,10 +81,10 @@ fn descent(problem: &Problem<'_>, run: &[(Station, Point)], pinned: &[bool]) -> 
         })
         .collect();
     let q: Vec<Lanes> = run.iter().map(|(_, point)| Lanes::from(*point.q)).collect();
-    let pull: Vec<f64> =
-        q.windows(2).map(|w| 1.0 / ((w[1] - w[0]).norm() + SHORTEST)).collect();
+    let pull: Vec<f64> = q.windows(2).map(|w| 1.0 / ((w[1] - w[0]).norm() + SHORTEST)).collect();
     // Forward: the blocks eliminated one after the other.
-    let mut factors: Vec<(Cholesky<f64, nalgebra::Const<MAX_DOF>>, Lanes)> = Vec::with_capacity(count);
+    let mut factors: Vec<(Cholesky<f64, nalgebra::Const<MAX_DOF>>, Lanes)> =
+        Vec::with_capacity(count);
     for k in 0..count {
         let p = &projectors[k];
         let (mut weight, mut force) = (STIFFNESS, Lanes::zeros());

@@ -68,7 +68,8 @@ impl Along {
         }
         let at = |point: &Point| Point3::from(point.tool.translation.vector);
         let looks = edge.windows(2).flat_map(|pair| {
-            (0..LOOKS).map(|k| pair[0].point.q.lerp(&pair[1].point.q, f64::from(k) / f64::from(LOOKS)))
+            (0..LOOKS)
+                .map(|k| pair[0].point.q.lerp(&pair[1].point.q, f64::from(k) / f64::from(LOOKS)))
         });
         let from_line = |q| distance_to_segment(&at(&space.point(q)), &at(a), &at(b));
         off.push(looks.map(from_line).fold(0.0, f64::max));

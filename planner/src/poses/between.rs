@@ -53,7 +53,8 @@ impl Space<'_> {
                     (tool.rotation * axis).angle(&(even.rotation * axis))
                 }
             };
-            turned <= TURN && (tool.translation.vector - even.translation.vector).norm() <= LINE_TOLERANCE
+            turned <= TURN
+                && (tool.translation.vector - even.translation.vector).norm() <= LINE_TOLERANCE
         })
     }
 

@@ -93,7 +93,8 @@ impl<'a> Space<'a> {
     /// still may.
     pub(crate) fn on_line(&self, pose: &Isometry3<f64>, q: &JointVector) -> Option<Point> {
         let spin = self.tolerance.0[5];
-        let exact = Tolerance([0.0, 0.0, 0.0, 0.0, 0.0, if spin > 0.0 { f64::INFINITY } else { 0.0 }]);
+        let exact =
+            Tolerance([0.0, 0.0, 0.0, 0.0, 0.0, if spin > 0.0 { f64::INFINITY } else { 0.0 }]);
         Space { tolerance: &exact, ..*self }.project(pose, q)
     }
 
@@ -119,7 +120,9 @@ impl<'a> Space<'a> {
         }
         let square = jacobian * jacobian.transpose() + Matrix6::identity() * SINGULAR;
         let identity = SMatrix::identity();
-        square.cholesky().map_or(identity, |square| identity - jacobian.transpose() * square.solve(&jacobian))
+        square
+            .cholesky()
+            .map_or(identity, |square| identity - jacobian.transpose() * square.solve(&jacobian))
     }
 
     /// Turns the tip's Jacobian into that of the tool's deviation, near enough for small tilts.

@@ -169,7 +169,8 @@ fn neighbours(poses: &[Isometry3<f64>]) -> Vec<Vec<usize>> {
         .map(|a| {
             let mut others: Vec<(f64, usize)> =
                 (0..poses.len()).filter(|&b| b != a).map(|b| (apart(a, b), b)).collect();
-            let nearer = |x: &(f64, usize), y: &(f64, usize)| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1));
+            let nearer =
+                |x: &(f64, usize), y: &(f64, usize)| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1));
             if others.len() > NEIGHBOURS {
                 others.select_nth_unstable_by(NEIGHBOURS, nearer);
                 others.truncate(NEIGHBOURS);

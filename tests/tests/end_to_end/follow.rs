@@ -13,7 +13,9 @@ use crate::rig;
 fn a_followed_path_is_published_and_gone_along() {
     let stage = stage();
     // Two rows in front of the PR2, the gripper's x axis ahead; its tip frame meets them.
-    let row = |x: f64| (0..5).map(move |i| format!("{x},{x},{},0.75,0,0,0,1\n", 0.05 * f64::from(i) - 0.4));
+    let row = |x: f64| {
+        (0..5).map(move |i| format!("{x},{x},{},0.75,0,0,0,1\n", 0.05 * f64::from(i) - 0.4))
+    };
     let rows: String = [0.6, 0.65].into_iter().flat_map(row).collect();
     let path = stage.file("path.csv");
     std::fs::write(&path, format!("segment,x,y,z,qx,qy,qz,qw\n{rows}")).expect("written");

@@ -172,9 +172,10 @@ mod tests {
                 &[[0.0, 0.0, 0.005], [0.0, 0.0, 0.0], [0.005, -0.005, 0.0]],
             ],
         );
-        is_near(&cuts("G20\nG0 X1 Y0 Z0\nG01 X2\n").unwrap(), &[&[[0.0254, 0.0, 0.0], [
-            0.0508, 0.0, 0.0,
-        ]]]);
+        is_near(
+            &cuts("G20\nG0 X1 Y0 Z0\nG01 X2\n").unwrap(),
+            &[&[[0.0254, 0.0, 0.0], [0.0508, 0.0, 0.0]]],
+        );
         let down = read("G0 X0 Y0 Z0\nG1 X1\n", Path::new("a.nc")).unwrap();
         assert!((down.segments.concat()[0].rotation * Vector3::z() + Vector3::z()).norm() < 1e-12);
         assert!(down.notes[0].contains("millimetres"));

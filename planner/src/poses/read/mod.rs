@@ -108,8 +108,8 @@ const GCODE: [&str; 8] = ["gcode", "nc", "ngc", "cnc", "tap", "gc", "g", "mpf"];
 /// # Errors
 /// Names the file and the line, or the pose.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Poses, PosesError> {
-    let bytes = std::fs::read(path)
-        .map_err(|source| PosesError::File { path: path.into(), source })?;
+    let bytes =
+        std::fs::read(path).map_err(|source| PosesError::File { path: path.into(), source })?;
     let text = String::from_utf8_lossy(&bytes);
     let text = text.trim_start_matches('\u{feff}');
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();

@@ -108,15 +108,16 @@ fn named(names: &[&str]) -> Option<Columns> {
         &["x", "px", "tx", "positionx", "posx", "translationx"],
         &["y", "py", "ty", "positiony", "posy", "translationy"],
         &["z", "pz", "tz", "positionz", "posz", "translationz"],
-        &["qx", "orientationx", "rotationx", "quatx", "quaternionx"],
-        &["qy", "orientationy", "rotationy", "quaty", "quaterniony"],
-        &["qz", "orientationz", "rotationz", "quatz", "quaternionz"],
-        &["qw", "orientationw", "rotationw", "quatw", "quaternionw"],
+        &["qx", "orientationx", "rotationx", "rotx", "quatx", "quaternionx"],
+        &["qy", "orientationy", "rotationy", "roty", "quaty", "quaterniony"],
+        &["qz", "orientationz", "rotationz", "rotz", "quatz", "quaternionz"],
+        &["qw", "orientationw", "rotationw", "rotw", "quatw", "quaternionw"],
     ];
     const SEGMENT: [&str; 4] = ["segment", "stroke", "raster", "pass"];
     let plain = |name: &str| {
         let name = name.split(['[', '(']).next().unwrap_or(name);
-        name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase()
+        let plain: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
+        plain.to_lowercase().trim_start_matches("target").to_owned()
     };
     let names: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let mut pose = [0; 7];
@@ -201,6 +202,8 @@ mod tests {
             "field.position.x,field.position.y\nposition.x,position.y,position.z,orientation.x,\
              orientation.y,orientation.z,orientation.w\n1,2,3,0,0,0.6,0.8\n",
             "0\t1\t2\t3\t0\t0\t0.6\t0.8\n",
+            "time,target-POS_X,target-POS_Y,target-POS_Z,target-ROT_X,target-ROT_Y,target-ROT_Z,\
+             target-ROT_W\n0,1,2,3,0,0,0.6,0.8\n",
         ] {
             assert_eq!(read_text(text).unwrap(), wanted, "{text}");
         }
@@ -233,7 +236,11 @@ mod tests {
             "# position, then quaternion (w, x, y, z)\n1 2 3 0.8 0 0 0.6\n",
             "# wxyz\n0 1 2 3 0.8 0 0 0.6\n",
         ] {
-            assert_eq!((auto(text).segments, auto(text).notes.len()), (wanted.clone(), 0), "{text}");
+            assert_eq!(
+                (auto(text).segments, auto(text).notes.len()),
+                (wanted.clone(), 0),
+                "{text}"
+            );
         }
         let wxyz = Some(QuaternionOrder::Wxyz);
         // A table with an index, its columns numbered.

@@ -34,9 +34,11 @@ pub(super) fn read(
     let mut reader = Reader { order, ..Reader::default() };
     let mut loose = Vec::new();
     for document in &documents {
-        reader
-            .walk(document, "", 0, &mut loose)
-            .map_err(|(place, what)| PosesError::Pose { path: path.into(), place, what })?;
+        reader.walk(document, "", 0, &mut loose).map_err(|(place, what)| PosesError::Pose {
+            path: path.into(),
+            place,
+            what,
+        })?;
     }
     reader.segments.push(loose);
     let file = path.display().to_string();
@@ -122,7 +124,8 @@ impl Reader {
     ) -> Result<Option<Isometry3<f64>>, Wrong> {
         let wrong = |what: String| (place.to_owned(), what);
         let position = fields.get("position").or_else(|| fields.get("translation"));
-        let rotation = ["orientation", "rotation", "quaternion"].iter().find_map(|n| fields.get(*n));
+        let rotation =
+            ["orientation", "rotation", "quaternion"].iter().find_map(|n| fields.get(*n));
         let (at, turn) = if let (Some(position), Some(rotation)) = (position, rotation) {
             let at = vector(position).map_err(|e| wrong(format!("position: {e}")))?;
             let turn = self.quaternion(rotation).map_err(|e| wrong(format!("orientation: {e}")))?;
@@ -207,13 +210,8 @@ mod tests {
     #[test]
     fn innermost_lists_of_a_tool_path_are_segments() {
         let pose = |x: i32| format!("{{x: {x}, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}}");
-        let text = format!(
-            "- - - {}\n    - {}\n  - - {}\n- - - {}\n",
-            pose(1),
-            pose(2),
-            pose(3),
-            pose(4)
-        );
+        let text =
+            format!("- - - {}\n    - {}\n  - - {}\n- - - {}\n", pose(1), pose(2), pose(3), pose(4));
         assert_eq!(places(&yaml(&text).unwrap()), [vec![1.0, 2.0], vec![3.0], vec![4.0]]);
         let json = r#"[[[{"x":1,"y":0,"z":0,"qw":0.6,"qx":0.8,"qy":0,"qz":0}]]]"#;
         let poses = read(json, Syntax::Json, Path::new("path.json"), None).unwrap();
@@ -235,16 +233,20 @@ mod tests {
     #[test]
     fn says_which_pose_is_broken() {
         for (text, place) in [
-            ("poses:\n- {position: {x: 1, y: 2}, orientation: {x: 0, y: 0, z: 0, w: 1}}", "poses[0]"),
+            (
+                "poses:\n- {position: {x: 1, y: 2}, orientation: {x: 0, y: 0, z: 0, w: 1}}",
+                "poses[0]",
+            ),
             ("a:\n- {x: 1, y: 2, z: 3, qw: 2, qx: 0, qy: 0, qz: 0}", "a[0]"),
-            ("- {x: 1, y: 2, z: .nan, qw: 1, qx: 0, qy: 0, qz: 0}", "[0]"),
         ] {
             match yaml(text) {
                 Err(PosesError::Pose { place: found, .. }) => assert_eq!(found, place, "{text}"),
                 other => panic!("{text}: {other:?}"),
             }
         }
-        assert!(matches!(yaml("a: [1, 2"), Err(PosesError::Syntax { .. })));
+        for text in ["a: [1, 2", "- {x: 1, y: 2, z: .nan, qw: 1, qx: 0, qy: 0, qz: 0}"] {
+            assert!(matches!(yaml(text), Err(PosesError::Syntax { .. })), "{text}");
+        }
         assert_eq!(places(&yaml("a: 1").unwrap()), Vec::<Vec<f64>>::new());
     }
 }
