@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::labels::{Cost, Ends, Givens, HERE, Labels, Link};
 use super::layer::{COARSE, FINE, Layer, Node, extend};
+use super::problem::Problem;
 use super::station::{Station, apart};
 use crate::motion::{back_away, jump, reconfigure};
-use crate::poses::{Point, Space};
-use crate::workcell::Workcell;
+use crate::poses::Point;
 
 /// Layers are about so many spacings of places apart.
 const STRIDE: f64 = 4.0;
@@ -21,17 +21,6 @@ const DENSER: usize = 2;
 /// other is tried.
 const SEEDS: u64 = 3;
 const STRIKES: usize = 16;
-
-/// What is searched.
-pub(super) struct Problem<'a> {
-    pub(super) space: Space<'a>,
-    pub(super) cell: Workcell<'a>,
-    pub(super) segments: &'a [Vec<Station>],
-    pub(super) start: Option<JointVector>,
-    /// See [`FollowConfig::step`](super::FollowConfig::step).
-    pub(super) step: [f64; 2],
-    pub(super) seed: u64,
-}
 
 /// A part of what was found.
 #[derive(Clone, Debug)]
@@ -423,16 +412,6 @@ impl<'a> Ladder<'a> {
         }
         let samples = self.layers.iter().map(|layer| layer.nodes.len()).sum();
         Found { parts, cost, layers: self.layers.len(), samples }
-    }
-}
-
-impl Problem<'_> {
-    /// The edge from a place to the next, if no joint jumps on it.
-    pub(super) fn step(&self, a: &Point, b: &Point) -> Option<Vec<Point>> {
-        let arm = self.cell.arm;
-        let most = |j: usize| self.step[usize::from(!arm.is_revolute(j))];
-        let jumps = (0..arm.dof()).any(|j| (b.q[j] - a.q[j]).abs() > most(j));
-        if jumps { None } else { self.space.edge(a, b) }
     }
 }
 

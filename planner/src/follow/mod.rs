@@ -16,6 +16,7 @@ mod figures;
 mod labels;
 mod ladder;
 mod layer;
+mod problem;
 mod run;
 mod smooth;
 mod station;

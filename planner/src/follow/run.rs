@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use super::config::FollowConfig;
 use super::error::FollowError;
 use super::figures::FollowFigures;
-use super::ladder::{Found, Part, Problem, search};
+use super::ladder::{Found, Part, search};
+use super::problem::Problem;
 use super::smooth::smooth;
 use super::station::{Station, stations};
 use crate::cost::{self, Effort};
@@ -87,7 +88,9 @@ pub fn run(
         velocity: config.speed.velocity(&arm),
     };
     progress.stage("timing", None);
-    let plan = config.speed.set(poses::assemble(given, &pieces), cell, &[]);
+    let plan = poses::assemble(given, &pieces);
+    let stops = ends(&plan);
+    let plan = config.speed.set(plan, cell, &stops);
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));
@@ -104,6 +107,15 @@ pub fn run(
         ..figures(&problem.space, &poses, &found, &pieces, &plan)
     };
     Ok(FollowOutcome { plan, figures, verification })
+}
+
+/// The knots where the tool comes onto the path or leaves it: there the arm rests, so that no blend cuts
+/// their poses off.
+fn ends(plan: &Plan) -> Vec<usize> {
+    let on_path = |k: Option<usize>| k.and_then(|k| plan.line(k)).is_some();
+    let is_end =
+        |&k: &usize| on_path(Some(k)) && !(on_path(k.checked_sub(1)) && on_path(Some(k + 1)));
+    (0..plan.knots.len()).filter(is_end).collect()
 }
 
 /// The places of all segments.

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, SMatrix, SVector};
 use nullsweep_robot::{JointVector, MAX_DOF};
 use rayon::prelude::*;
 
-use super::ladder::Problem;
+use super::problem::Problem;
 use super::station::Station;
 use crate::poses::Point;
 
