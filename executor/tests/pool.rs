@@ -1,5 +1,5 @@
 //! The real-time thread's heap: whatever it is asked for, blocks are apart, keep what is written into
-//! them, and go back to where they came from. Small enough for Miri, valgrind and a sanitizer.
+//! them, and go back to where they came from. Small enough for Miri (`MIRIFLAGS=-Zmiri-tree-borrows`), valgrind and a sanitizer.
 
 #![allow(unsafe_code, reason = "an allocator is asked as a program asks it")]
 
@@ -18,7 +18,7 @@ static ALLOCATOR: PoolAllocator = PoolAllocator::new();
 /// Requests: few under Miri, which takes a thousand times as long.
 const ROUNDS: usize = if cfg!(miri) { 300 } else { 20_000 };
 /// The pool's size. \[bytes\]
-const SIZE: usize = 4 << 20;
+const SIZE: usize = if cfg!(miri) { 1 << 18 } else { 4 << 20 };
 
 /// A block that was asked for, and the byte that it is full of.
 struct Block {
@@ -72,7 +72,7 @@ impl Drop for Block {
 }
 
 fn layout(random: &mut ChaCha8Rng) -> Layout {
-    let size = 1usize << random.random_range(0..14);
+    let size = 1usize << random.random_range(0..if cfg!(miri) { 10 } else { 14 });
     let align = 1usize << random.random_range(0..8);
     Layout::from_size_align(size + random.random_range(0..size), align).unwrap()
 }

@@ -40,6 +40,9 @@ pub mod tour;
 pub mod verify;
 
 pub mod link;
+pub mod poses;
+
+pub mod follow;
 pub mod pipeline;
 pub mod task;
 pub mod transit;

@@ -10,9 +10,11 @@ use std::path::Path;
 use nullsweep_collision::Options;
 use nullsweep_planner::pipeline::{End, Job, StanceChoice, run};
 use nullsweep_planner::plan::{CostKind, Method, Profile};
+use nullsweep_planner::poses::{self, Tolerance};
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::roadmap::GraphConfig;
-use nullsweep_planner::task::{self, TaskConfig, Tolerance};
+use nullsweep_planner::task::{self, TaskConfig};
+use nullsweep_planner::timing::Speed;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::Stance;
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
@@ -183,13 +185,12 @@ fn given_poses_are_planned_as_ever() {
     }
     let config = TaskConfig {
         arm: ArmSpec::pr2(Side::Right),
-        tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
+        tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
         tolerance: Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]),
         stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
         start: None,
-        profile: Profile::Velocity,
+        speed: Speed::default(),
         collision: Options::default(),
-        v_max: None,
         rounds: 2,
         trials: 10,
         seed: 1,
@@ -204,7 +205,7 @@ fn given_poses_are_planned_as_ever() {
     .expect("a plan");
     assert_golden(
         &[("dome".into(), outcome.plan.digest().expect("short enough"))],
-        &[("dome", 0xb916e2324f907aff)],
+        &[("dome", 0xb013d10b6bea0336)],
     );
 }
 

@@ -3,12 +3,15 @@
 mod common;
 
 use std::path::Path;
+use std::sync::Mutex;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options};
 use nullsweep_planner::plan::Profile;
-use nullsweep_planner::progress::Silent;
-use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome, Tolerance};
+use nullsweep_planner::poses::{self, ReadOptions, Tolerance};
+use nullsweep_planner::progress::{Progress, Silent};
+use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome};
+use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
 use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::{ArmSpec, Geometry, Robot, Side, Tool};
@@ -17,13 +20,12 @@ fn config(tolerance: Tolerance) -> TaskConfig {
     TaskConfig {
         arm: ArmSpec::pr2(Side::Right),
         // Poses of the gripper's tool frame, its x axis ahead.
-        tool: Tool { approach: [1.0, 0.0, 0.0], ..task::tip_tool() },
+        tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
         tolerance,
         stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
         start: None,
-        profile: Profile::Velocity,
+        speed: Speed::default(),
         collision: Options::default(),
-        v_max: None,
         rounds: 2,
         trials: 10,
         seed: 1,
@@ -89,19 +91,81 @@ fn the_wok_takes_less_than_forty_radians() {
         println!("skipped: {} is not there", data.display());
         return;
     }
-    let poses = task::read(&data.join("ur5_20240819_164816_wok.csv")).unwrap().poses;
+    let poses = poses::read(&data.join("ur5_20240819_164816_wok.csv"), &ReadOptions::default())
+        .unwrap()
+        .all();
     let robot = Robot::from_urdf_file(&data.join("ur5.urdf")).unwrap();
     let config = TaskConfig {
         arm: ArmSpec { base: "base_link".into(), tip: "tool_tip".into() },
-        tool: task::tip_tool(),
+        tool: poses::tip_tool(),
         collision: Options { fit_capsules: Some(0.05), ..Options::default() },
         ..config("0.05,0.05,0,0,0,free".parse().unwrap())
     };
     let outcome = task::run(&robot, &poses, &nothing(), &config, &Silent).unwrap();
     let figures = &outcome.figures;
+    println!("{figures:?}");
     assert_eq!(outcome.verification.violations, []);
     assert_eq!((figures.met, figures.reconfigurations), (209, 0));
     assert!(figures.movement_rad < 40.0, "{} rad", figures.movement_rad);
+    // Between poses too the tool keeps to the straight line.
+    assert!(figures.edge_deviation_max_m < 5e-4, "{} m", figures.edge_deviation_max_m);
+}
+
+/// The hand turns once round along a line: no one posture meets all of it.
+#[test]
+fn postures_that_complement_each_other_meet_all_poses() {
+    let data = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data"));
+    if !data.exists() {
+        println!("skipped: {} is not there", data.display());
+        return;
+    }
+    let path = data.join("reports/line_with_turn.csv");
+    let poses = poses::read(&path, &ReadOptions::default()).unwrap().all();
+    let robot = Robot::from_urdf_file(&data.join("coverage-tasks/panda.urdf")).unwrap();
+    let config = TaskConfig {
+        arm: ArmSpec { base: "world".into(), tip: "panda_hand".into() },
+        tool: poses::tip_tool(),
+        collision: Options { fit_capsules: Some(0.05), ..Options::default() },
+        ..config(Tolerance([0.0; 6]))
+    };
+    let outcome = task::run(&robot, &poses, &nothing(), &config, &Silent).unwrap();
+    assert_eq!(outcome.verification.violations, []);
+    assert!(outcome.figures.met >= 199, "{:?}", outcome.figures);
+    assert!(outcome.figures.edge_deviation_max_m < 5e-4, "{:?}", outcome.figures);
+}
+
+/// A post keeps the arm from some poses: only those are left out, and it is told why.
+#[test]
+fn a_pose_is_left_out_for_what_is_in_the_way() {
+    let dome = common::dome();
+    let at = dome[12].translation.vector;
+    let post = Obstacle {
+        name: "post".into(),
+        shape: ObstacleShape::Geometry(Geometry::Box { half_extents: Vector3::repeat(0.02) }),
+        pose: Isometry3::from(at),
+        carries_robot: false,
+    };
+    let scene = Scene { obstacles: vec![post], ..nothing() };
+    let notes = Notes::default();
+    let config = config(Tolerance::AXIS);
+    let outcome = task::run(&Robot::pr2(), &dome, &scene, &config, &notes).unwrap();
+    assert_eq!(outcome.verification.violations, []);
+    let notes = notes.0.into_inner().unwrap();
+    assert!(notes.iter().any(|n| n.contains("left out") && n.contains("post")), "{notes:?}");
+    assert!(!notes.iter().any(|n| n.contains("inside the arm's limits")), "{notes:?}");
+    assert!((15..25).contains(&outcome.figures.met), "{:?}", outcome.figures);
+}
+
+/// Keeps what is told.
+#[derive(Default)]
+struct Notes(Mutex<Vec<String>>);
+
+impl Progress for Notes {
+    fn stage(&self, _: &'static str, _: Option<usize>) {}
+    fn tick(&self) {}
+    fn note(&self, text: &str) {
+        self.0.lock().unwrap().push(text.into());
+    }
 }
 
 /// What the check of a plan says of it in a scene.
@@ -167,7 +231,7 @@ fn a_task_begins_where_the_arm_is_and_keeps_its_accelerations() {
     let start = arm.home();
     let from_home = TaskConfig {
         start: Some(start),
-        profile: Profile::Acceleration,
+        speed: Speed { profile: Profile::Acceleration, ..Speed::default() },
         ..config(Tolerance::AXIS)
     };
     let outcome = task::run(&robot, &common::dome(), &nothing(), &from_home, &Silent).unwrap();

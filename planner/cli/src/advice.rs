@@ -5,6 +5,7 @@ use std::error::Error;
 
 use nullsweep_collision::{CollisionError, MeshError};
 use nullsweep_ipc_types::{Mode, Reason};
+use nullsweep_planner::follow::FollowError;
 use nullsweep_planner::link::posture::PostureError;
 use nullsweep_planner::link::publish::PublishError;
 use nullsweep_planner::link::replan::ReplanError;
@@ -31,6 +32,8 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         pipeline(error)
     } else if let Some(error) = error.downcast_ref() {
         task(error)
+    } else if let Some(error) = error.downcast_ref() {
+        follow(error)
     } else if let Some(error) = error.downcast_ref() {
         plan(error)
     } else if let Some(error) = error.downcast_ref() {
@@ -129,19 +132,31 @@ fn pipeline(error: &PipelineError) -> Option<String> {
 
 fn task(error: &TaskError) -> Option<String> {
     match error {
-        TaskError::NothingMet { .. } => {
-            Some("--arm BASE,TIP names the tip link; --floor says how high the floor is".into())
-        }
-        TaskError::StanceHit { .. } => Some(
-            "--base says where in the scene the robot stands; space that no scan has seen counts as \
-             free with --unseen free"
-                .into(),
-        ),
+        TaskError::NothingMet { .. } => Some(NOTHING_MET.into()),
+        TaskError::StanceHit { .. } => Some(STANDS_IN.into()),
         TaskError::Start { .. } | TaskError::NoWay { .. } => Some("give another --start".into()),
         TaskError::Collision(error) => collision(error),
         _ => None,
     }
 }
+
+fn follow(error: &FollowError) -> Option<String> {
+    match error {
+        FollowError::NothingMet { .. } => Some(NOTHING_MET.into()),
+        FollowError::StanceHit { .. } => Some(STANDS_IN.into()),
+        FollowError::Start { .. } | FollowError::NoWay { .. } => {
+            Some("give another --start".into())
+        }
+        FollowError::Collision(error) => collision(error),
+        _ => None,
+    }
+}
+
+/// Where given poses are out of reach, and where the robot stands in something.
+const NOTHING_MET: &str = "--arm BASE,TIP names the tip link, --offset moves the poses, --quat wxyz \
+                           reads quaternions with the scalar first; --floor says how high the floor is";
+const STANDS_IN: &str = "--base says where in the scene the robot stands; space that no scan has seen \
+                         counts as free with --unseen free";
 
 fn plan(error: &PlanError) -> Option<String> {
     let text = match error {

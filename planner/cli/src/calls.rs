@@ -8,8 +8,8 @@ use clap::{Args, Parser};
 use nalgebra::Isometry3;
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
+use nullsweep_planner::poses::{Poses, tip_tool};
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::task::{Poses, tip_tool};
 use nullsweep_planner::verify::{Verification, Violation};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::ReportData;
@@ -109,11 +109,11 @@ pub fn task(
     listener: Listener,
 ) -> anyhow::Result<Planned> {
     let args: TaskArgs = parse(words)?;
-    let poses = Poses { poses, notes: Vec::new() };
+    let poses = Poses { segments: vec![poses], notes: Vec::new() };
     let made = Arc::new(args.task.work(poses, args.site.site(), &Bars::of(listener))?);
     let (outcome, page) = (&made.outcome, Arc::clone(&made));
     let found = &outcome.verification;
-    Planned::new(&outcome.plan, found, &outcome.figures, Box::new(move || page.page()))
+    Planned::new(&outcome.plan, found, &outcome.figures, Box::new(move || page.drawn().page()))
 }
 
 /// `planner verify` of a plan.

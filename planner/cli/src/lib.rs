@@ -10,12 +10,15 @@ mod experiment;
 mod export;
 mod figures;
 mod floor;
+mod follow;
+mod given;
 mod goto;
 mod gtsp;
 mod inspect;
 mod jerk;
 mod json;
 mod numbers;
+mod obstacles;
 mod output;
 mod picture;
 mod placed;
@@ -71,8 +74,10 @@ enum Command {
     Plan(Box<plan::PlanCommandArgs>),
     /// Show what is in a scanned scene: its planes, and its objects by number.
     Scene(Box<scene_command::SceneCommandArgs>),
-    /// Make a plan through given tool poses.
+    /// Make a plan through given tool poses, in whatever order is shortest.
     Task(Box<task::TaskArgs>),
+    /// Make a plan that follows given tool paths in their order.
+    Follow(Box<follow::FollowArgs>),
     /// Check a plan file against the scene that it was made for.
     Verify(Box<verify::VerifyArgs>),
     /// Show plans, scans and scenes in a browser: the arm moving, what is swept and what is left.
@@ -121,6 +126,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Plan(args) => plan::run(&args),
         Command::Scene(args) => scene_command::run(&args),
         Command::Task(args) => task::run(&args),
+        Command::Follow(args) => follow::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::View(args) => view::run(&args),
         Command::Publish(args) => publish::run(&args),

@@ -64,6 +64,24 @@ impl<const N: usize> FromStr for Numbers<N> {
     }
 }
 
+/// Where a frame is: x, y, z \[m\], and, if they are there, roll, pitch and yaw about the fixed axes, in
+/// this order \[rad\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Offset(pub(super) Isometry3<f64>);
+
+impl FromStr for Offset {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let [x, y, z, roll, pitch, yaw] = match text.parse() {
+            Ok(Numbers([x, y, z])) => [x, y, z, 0.0, 0.0, 0.0],
+            Err(_) => text.parse::<Numbers<6>>().map_err(|e| format!("{e}, nor 3"))?.0,
+        };
+        let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        Ok(Self(Isometry3::from_parts(Translation3::new(x, y, z), rotation)))
+    }
+}
+
 /// The position of a held joint: NAME=VALUE. \[rad\] or \[m\]
 #[derive(Clone, Debug)]
 pub(super) struct Held(pub(super) String, pub(super) f64);

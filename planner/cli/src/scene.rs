@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use clap::Args;
 use nalgebra::Point3;
+use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_surface::{CleanConfig, CropBox, PlacedScan, Placement, scan, simulate, unseen};
 
 use crate::bars::Bars;
+use crate::obstacles;
 use crate::placed::{Gravity, PlacedArgs, read_scans};
 use crate::room::{self, ObjectChoice};
 use crate::table::{self, TableSize};
@@ -36,6 +38,10 @@ pub(super) struct SceneArgs {
     /// --sensor-pose: gravity is found by the largest level plane.
     #[arg(long, value_name = "OBJECT", conflicts_with = "crop", allow_hyphen_values = true)]
     object: Option<ObjectChoice>,
+    /// Solid things that are placed, not measured: a TOML file with tables [[box]] (centre, size, rpy),
+    /// [[cylinder]] (centre, radius, height, rpy) and [[sphere]] (centre, radius), in the floor frame.
+    #[arg(long, value_name = "FILE")]
+    obstacles: Option<PathBuf>,
 }
 
 impl SceneArgs {
@@ -44,6 +50,11 @@ impl SceneArgs {
         let chosen = self.object.is_some() || self.crop.is_some();
         let object = if chosen { self.object } else { Some(ObjectChoice::At(point)) };
         Self { object, ..self.clone() }
+    }
+
+    /// The solid things that are placed.
+    pub(super) fn obstacles(&self) -> anyhow::Result<Vec<Obstacle>> {
+        self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)
     }
 
     /// How the scans stand.
@@ -120,6 +131,7 @@ pub(super) fn scene(
             bars,
         ));
     }
+    scene.obstacles.extend(args.obstacles()?);
     Ok(scene)
 }
 

@@ -116,7 +116,9 @@ impl AgainstArgs {
             let choice = swept.map_or_else(|| self.scene.clone(), |point| self.scene.or_at(point));
             scene(&choice, None, std::slice::from_ref(file), seed, bars)?
         } else if self.demo.is_none() && self.scans.is_empty() {
-            Scene::empty()
+            let mut floor = Scene::empty();
+            floor.obstacles.extend(self.scene.obstacles()?);
+            floor
         } else {
             scene(&self.scene, self.demo, &self.scans, seed, bars)?
         };

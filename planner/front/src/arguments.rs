@@ -35,9 +35,12 @@ pub(crate) enum Command {
     /// Make a plan from scans, or from a simulated scan.
     #[command(disable_help_flag = true)]
     Plan(Rest),
-    /// Make a plan through given tool poses.
+    /// Make a plan through given tool poses, in whatever order is shortest.
     #[command(disable_help_flag = true)]
     Task(Rest),
+    /// Make a plan that follows given tool paths in their order.
+    #[command(disable_help_flag = true)]
+    Follow(Rest),
     /// Show what is in a scanned scene.
     #[command(disable_help_flag = true)]
     Scene(Rest),

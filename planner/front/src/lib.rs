@@ -28,6 +28,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Man { folder } => describe::manuals(&folder),
         Command::Plan(rest) => start(PLANNER, Some("plan"), rest.args),
         Command::Task(rest) => start(PLANNER, Some("task"), rest.args),
+        Command::Follow(rest) => start(PLANNER, Some("follow"), rest.args),
         Command::Scene(rest) => start(PLANNER, Some("scene"), rest.args),
         Command::Verify(rest) => start(PLANNER, Some("verify"), rest.args),
         Command::View(rest) => start(PLANNER, Some("view"), rest.args),

@@ -49,10 +49,13 @@ pub fn reconfigure(
     seed: u64,
 ) -> Option<Vec<JointVector>> {
     let to = cell.arm.continuous().nearest_turn(to, from);
-    let off = |q: &JointVector| {
-        retract(cell.world, cell.arm, cell.tool, q, LIFT).or_else(|| lift(cell, q))
-    };
-    across(cell, off(from)?, off(&to)?, &Options::default(), seed)
+    across(cell, back_away(cell, from)?, back_away(cell, &to)?, &Options::default(), seed)
+}
+
+/// The way off a pose, also where the tool is free: [`retract`] by the default lift, else [`lift`].
+#[must_use]
+pub fn back_away(cell: Workcell<'_>, q: &JointVector) -> Option<Vec<JointVector>> {
+    retract(cell.world, cell.arm, cell.tool, q, LIFT).or_else(|| lift(cell, q))
 }
 
 /// The path that goes up the first way, through free space, and back the second way.

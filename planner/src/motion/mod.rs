@@ -11,7 +11,7 @@ mod rrt_connect;
 #[cfg(test)]
 mod tests;
 
-pub use jump::{jump, reconfigure};
+pub use jump::{back_away, jump, reconfigure};
 pub use leg::Leg;
 pub use memo::Memo;
 pub use mover::{Mover, lift_cost};

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use nullsweep_robot::JointVector;
 
-use super::space::{Point, Space};
+use crate::poses::{Point, Space};
 
 /// Poses in the order in which they are visited, and the joint vector at each.
 #[derive(Clone, Debug)]
@@ -17,9 +17,34 @@ pub(super) struct Route {
 /// What an edge that changes the posture costs besides its length: more than any detour. \[rad\]
 pub(super) const PENALTY: f64 = 20.0;
 /// A relaxed joint vector that gains less than this stays. \[rad\]
-const GAIN: f64 = 1e-7;
+const GAIN: f64 = 1e-6;
+/// One that gains less than this gives no reason to look for other places again. \[rad\]
+const LITTLE: f64 = 1e-4;
 /// Neighbours in the pose's list beside which it is tried.
 const BESIDE: usize = 10;
+
+/// What of a route has to be looked at again, by pose.
+pub(super) struct Unsettled {
+    /// Whether its joint vector, or one beside it, was changed since it did not gain any more.
+    loose: Vec<bool>,
+    /// Whether it was moved by more than a little since places were looked for.
+    moved: Vec<bool>,
+}
+
+impl Unsettled {
+    /// All of so many poses.
+    pub(super) fn all(poses: usize) -> Self {
+        Self { loose: vec![true; poses], moved: vec![true; poses] }
+    }
+
+    /// A pose was changed, those beside it are to be looked at too.
+    fn changed(&mut self, order: &[usize], at: usize, gain: f64) {
+        for &pose in &order[at.saturating_sub(1)..(at + 2).min(order.len())] {
+            self.loose[pose] = true;
+            self.moved[pose] |= gain > LITTLE;
+        }
+    }
+}
 
 /// Poses, their neighbours and the space that they are met in.
 pub(super) struct Task<'a> {
@@ -43,14 +68,22 @@ impl Task<'_> {
 
     /// Moves every joint vector to where it makes the way shorter, one after the other, again and
     /// again; at most `sweeps` times.
-    pub(super) fn relax(&self, route: &mut Route, sweeps: usize) {
+    pub(super) fn relax(&self, route: &mut Route, open: &mut Unsettled, sweeps: usize) {
         for sweep in 0..sweeps {
             let mut gained = 0.0;
             let count = route.order.len();
             for step in 0..count {
                 // Forwards and backwards in turn, so that changes travel both ways.
                 let at = if sweep % 2 == 0 { step } else { count - 1 - step };
-                gained += self.relax_at(route, at);
+                let pose = route.order[at];
+                if !std::mem::take(&mut open.loose[pose]) {
+                    continue;
+                }
+                let gain = self.relax_at(route, at);
+                if gain > 0.0 {
+                    open.changed(&route.order, at, gain);
+                }
+                gained += gain;
             }
             if gained < 1e-5 * count as f64 {
                 return;
@@ -95,10 +128,20 @@ impl Task<'_> {
 
     /// Takes single poses out and puts them where they cost least, their joint vectors moved to
     /// suit the new place; returns what is gained. \[rad\]
-    pub(super) fn reinsert(&self, route: &mut Route) -> f64 {
+    pub(super) fn reinsert(&self, route: &mut Route, open: &mut Unsettled) -> f64 {
         let mut gained = 0.0;
+        let mut moved = std::mem::replace(&mut open.moved, vec![false; self.poses.len()]);
+        let mut place = vec![usize::MAX; self.poses.len()];
+        route.order.iter().enumerate().for_each(|(k, &pose)| place[pose] = k);
         for pose in 0..self.poses.len() {
-            let Some(at) = route.order.iter().position(|&p| p == pose) else { continue };
+            let at = place[pose];
+            if at == usize::MAX {
+                continue;
+            }
+            let beside = self.near[pose].iter().take(BESIDE);
+            if !moved[pose] && !beside.clone().any(|&other| moved[other]) {
+                continue;
+            }
             let point =
                 |k: Option<usize>| k.and_then(|k| route.order.get(k)).map(|&p| route.points[p]);
             let (before, after) = (point(at.checked_sub(1)), point(Some(at + 1)));
@@ -111,15 +154,16 @@ impl Task<'_> {
             if saved < 1e-3 {
                 continue;
             }
-            let mut rest = route.order.clone();
-            rest.remove(at);
+            // Places are those of the order without this pose.
+            let rest = |k: usize| point(Some(k + usize::from(k >= at)));
             let mut best: Option<(f64, usize, Point)> = None;
-            for &other in self.near[pose].iter().take(BESIDE) {
-                let Some(beside) = rest.iter().position(|&p| p == other) else { continue };
-                for place in [beside, beside + 1] {
-                    let point =
-                        |k: Option<usize>| k.and_then(|k| rest.get(k)).map(|&p| route.points[p]);
-                    let (a, b) = (point(place.checked_sub(1)), point(Some(place)));
+            for &other in beside {
+                if place[other] == usize::MAX {
+                    continue;
+                }
+                let beside = place[other] - usize::from(place[other] > at);
+                for k in [beside, beside + 1] {
+                    let (a, b) = (k.checked_sub(1).and_then(rest), rest(k));
                     let start = match (&a, &b) {
                         (Some(a), Some(b)) => JointVector::from_fn(|j| 0.5 * (a.q[j] + b.q[j])),
                         (Some(one), None) | (None, Some(one)) => one.q,
@@ -130,15 +174,22 @@ impl Task<'_> {
                     if cost < best.as_ref().map_or(saved - 1e-6, |b| b.0)
                         && self.space.is_free(&new)
                     {
-                        best = Some((cost, place, new));
+                        best = Some((cost, k, new));
                     }
                 }
             }
-            if let Some((cost, place, new)) = best {
-                rest.insert(place, pose);
-                route.order = rest;
+            if let Some((cost, to, new)) = best {
+                route.order.remove(at);
+                route.order.insert(to, pose);
+                for k in at.min(to)..=at.max(to) {
+                    place[route.order[k]] = k;
+                }
                 route.points[pose] = new;
                 gained += saved - cost;
+                for at in [at.min(route.order.len() - 1), to] {
+                    open.changed(&route.order, at, saved - cost);
+                }
+                moved[pose] = true;
             }
         }
         gained

@@ -3,21 +3,21 @@
 use std::time::Instant;
 
 use nalgebra::Isometry3;
-use nullsweep_collision::{ToolContact, World};
-use nullsweep_robot::{Arm, JointVector, Robot};
+use nullsweep_collision::World;
+use nullsweep_robot::{JointVector, Robot};
+use rayon::prelude::*;
 
-use super::assemble::{Way, assemble};
 use super::config::TaskConfig;
 use super::error::TaskError;
 use super::figures::TaskFigures;
 use super::route::Route;
 use super::search::search;
-use super::space::{Point, RESIDUAL, Space};
 use crate::cost::{self, Effort};
-use crate::motion::{jump, reconfigure};
-use crate::plan::{Plan, Profile};
+use crate::plan::Plan;
+use crate::poses::{
+    self, Along, Chain, Order, Piece, Point, Space, Stop, chain, tell_unmet, why_not_start,
+};
 use crate::progress::{Progress, left_out};
-use crate::timing::{Limits, accelerate};
 use crate::verify::{Given, Verification, verify};
 use crate::workcell::{Scene, Workcell};
 
@@ -53,25 +53,29 @@ pub fn run(
     if let Some(hit) = world.stance_hit() {
         return Err(TaskError::StanceHit { hit: hit.to_string() });
     }
-    if let Some(q) = &config.start {
-        starts(&arm, &world, q)?;
+    if let Some(why) = config.start.and_then(|q| why_not_start(&arm, &world, &q)) {
+        return Err(TaskError::Start { why });
     }
     let space = Space::new(&arm, &world, &config.tool, &config.tolerance);
-    let (mut route, unmet) = search(space, poses, config, progress)?;
-    if !unmet.is_empty() {
-        progress.note(&left_out(["pose", "poses"], &unmet, "no joint vector meets it"));
-    }
+    let (route, unmet) = search(space, poses, config, progress)?;
+    tell_unmet(&unmet, progress);
     let cell = Workcell { arm: &arm, tool: &config.tool, world: &world };
-    let Some(way) = connect(&space, cell, &mut route, config, progress) else {
-        return Err(TaskError::NoWay { met: poses.len() - unmet.len() });
+    let pieces = connect(&space, cell, &route, config, progress)
+        .ok_or(TaskError::NoWay { met: poses.len() - unmet.len() })?;
+    let given = poses::Given {
+        robot,
+        arm: &arm,
+        tool: &config.tool,
+        stance: &config.stance,
+        poses,
+        seed: config.seed,
+        velocity: config.speed.velocity(&arm),
     };
-    let mut plan = assemble(robot, &arm, poses, &route, &way, config);
-    if config.profile == Profile::Acceleration {
-        progress.stage("timing", None);
-        let at_rest: Vec<usize> =
-            (0..plan.knots.len()).filter(|&k| plan.knots[k].patch.is_some()).collect();
-        plan = accelerate(&plan, cell, &Limits::of(&arm, config.v_max), &at_rest);
-    }
+    let plan = poses::assemble(given, &pieces);
+    progress.stage("timing", None);
+    let at_rest: Vec<usize> =
+        (0..plan.knots.len()).filter(|&k| plan.knots[k].patch.is_some()).collect();
+    let plan = config.speed.set(plan, cell, &at_rest);
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));
@@ -79,24 +83,17 @@ pub fn run(
     let given = Given { robot, arm: &config.arm, scene: &scene, collision: &config.collision };
     let verification = verify(&plan, given, &|| progress.tick())?;
     let joints: Vec<JointVector> = plan.knots.iter().map(|k| k.q).collect();
-    let straight: Vec<(&Point, &Point)> = pairs(&route)
-        .zip(&way.edges)
-        .filter(|(_, through)| through.is_none())
-        .map(|(pair, _)| pair)
-        .collect();
-    let mut off: Vec<f64> = straight.iter().map(|(a, b)| deviation(&space, a, b)).collect();
-    off.sort_by(f64::total_cmp);
-    let excess = |&pose: &usize| space.excess(&poses[pose], &route.points[pose].tool).amax();
+    let along = Along::of(&space, poses, &pieces);
     let figures = TaskFigures {
         poses: poses.len(),
-        met: route.order.iter().filter(|p| excess(p) < 10.0 * RESIDUAL).count(),
-        movement_rad: straight.iter().map(|(a, b)| a.q.distance(&b.q)).sum(),
-        reconfigurations: way.edges.iter().flatten().count(),
+        met: along.met,
+        movement_rad: along.movement,
+        reconfigurations: along.ways.saturating_sub(usize::from(config.start.is_some())),
         effort_rad: cost::of_path(&Effort, &joints),
         task_time_s: plan.duration(),
-        excess_max: route.order.iter().map(excess).fold(0.0, f64::max),
-        edge_deviation_p90_m: off.get(off.len() * 9 / 10).copied().unwrap_or(0.0),
-        edge_deviation_max_m: off.last().copied().unwrap_or(0.0),
+        excess_max: along.excess,
+        edge_deviation_p90_m: along.deviation_p90,
+        edge_deviation_max_m: along.deviation_max,
         violations: verification.violations.len(),
         against: verification.against.clone(),
         calc_time_s,
@@ -106,71 +103,76 @@ pub fn run(
     Ok(TaskOutcome { plan, figures, verification })
 }
 
-fn pairs(route: &Route) -> impl Iterator<Item = (&Point, &Point)> {
-    route.order.windows(2).map(|w| (&route.points[w[0]], &route.points[w[1]]))
-}
-
-/// Whether the arm can be at a joint vector.
-fn starts(arm: &Arm, world: &World, q: &JointVector) -> Result<(), TaskError> {
-    let limits = arm.margined_limits().iter().zip(q.iter()).zip(arm.joint_names());
-    let outside = |((low, high), q): (&(f64, f64), &f64)| !(*low..=*high).contains(q);
-    let why = limits.into_iter().find_map(|((limit, q), name)| {
-        let (low, high) = limit;
-        outside((limit, q))
-            .then(|| format!("{name} is at {q:.4}, its range is {low:.4} to {high:.4}"))
-    });
-    let hit = || world.why_not(q, ToolContact::Allowed).map(|hit| hit.to_string());
-    why.or_else(hit).map_or(Ok(()), |why| Err(TaskError::Start { why }))
-}
-
-/// The way from the start to the first pose, and for each edge of the route the way through free
-/// space, where it is a reconfiguration or collides. A pose that none leads to is taken out of the
-/// route; `None` where that is all of them.
+/// The way through the route, from the start on where there is one. What no way leads to is left out;
+/// `None` where that is all.
 fn connect(
     space: &Space<'_>,
     cell: Workcell<'_>,
-    route: &mut Route,
+    route: &Route,
     config: &TaskConfig,
     progress: &dyn Progress,
-) -> Option<Way> {
-    let seed = config.seed;
-    let mut order: Vec<usize> = Vec::new();
-    let mut way = Way { approach: None, edges: Vec::new() };
-    for &pose in &route.order {
-        let b = &route.points[pose];
-        let Some(&last) = order.last() else {
-            if let Some(start) = &config.start {
-                way.approach = jump(cell, start, &b.q, seed);
-                if way.approach.is_none() {
-                    progress.note(&format!(
-                        "pose {pose} is left out: no motion through free space was found from the start"
-                    ));
-                    continue;
-                }
-            }
-            order.push(pose);
-            continue;
-        };
-        let a = &route.points[last];
-        let goes_straight = !space.is_reconfiguration(a, b)
-            && space.world.motion_free(&a.q, &b.q, ToolContact::Allowed);
-        if goes_straight {
-            way.edges.push(None);
-        } else if let Some(path) = reconfigure(cell, &a.q, &b.q, seed) {
-            way.edges.push(Some(path));
-        } else {
-            progress.note(&format!(
-                "pose {pose} is left out: no motion through free space was found from pose {last}"
-            ));
-            continue;
+) -> Option<Vec<Piece>> {
+    progress.stage("ways", None);
+    let runs = runs(space, route);
+    let (start, seed) = (config.start.as_ref(), config.seed);
+    let mut order: Vec<usize> = (0..runs.len()).collect();
+    let mut best = chain(cell, &runs, start, Order::Free, seed);
+    let count = |runs: &[usize], of: &[Vec<Stop>]| -> usize {
+        runs.iter().map(|&run| of[run].iter().filter(|s| s.pose.is_some()).count()).sum()
+    };
+    // From a small run that leads nowhere the largest one is not come to: it is begun with.
+    let largest = (0..runs.len()).rev().max_by_key(|&run| count(&[run], &runs))?;
+    if start.is_none() && best.left_out.contains(&largest) {
+        order.remove(largest);
+        order.insert(0, largest);
+        let other: Vec<Vec<Stop>> = order.iter().map(|&run| runs[run].clone()).collect();
+        let again = chain(cell, &other, start, Order::Free, seed);
+        let left: Vec<usize> = again.left_out.iter().map(|&run| order[run]).collect();
+        if count(&left, &runs) < count(&best.left_out, &runs) {
+            best = Chain { left_out: left, ..again };
         }
-        order.push(pose);
     }
-    route.order = order;
-    (!route.order.is_empty()).then_some(way)
+    let mut left: Vec<usize> =
+        best.left_out.iter().flat_map(|&run| &runs[run]).filter_map(|stop| stop.pose).collect();
+    left.sort_unstable();
+    if best.pieces.is_empty() {
+        return None;
+    }
+    if !left.is_empty() {
+        progress.note(&left_out(
+            ["pose", "poses"],
+            &left,
+            "no motion through free space leads there from the other poses, or the tool does not come \
+             off there",
+        ));
+    }
+    Some(best.pieces)
 }
 
-/// Largest distance of the tool from the straight line along an edge. \[m\]
-fn deviation(space: &Space<'_>, a: &Point, b: &Point) -> f64 {
-    (1..16).map(|k| space.deviation_at(a, b, f64::from(k) / 16.0)).fold(0.0, f64::max)
+/// The route in runs within which the arm goes from pose to pose without leaving its posture: free of
+/// collision, with what has to be put in so that the tool goes straight.
+fn runs(space: &Space<'_>, route: &Route) -> Vec<Vec<Stop>> {
+    let edges: Vec<Option<Vec<Stop>>> = route
+        .order
+        .par_windows(2)
+        .map(|pair| edge(space, &route.points[pair[0]], &route.points[pair[1]]))
+        .collect();
+    let mut runs: Vec<Vec<Stop>> = Vec::new();
+    for (k, &pose) in route.order.iter().enumerate() {
+        let stop = Stop { point: route.points[pose], pose: Some(pose) };
+        match (k.checked_sub(1).and_then(|e| edges[e].as_ref()), runs.last_mut()) {
+            (Some(between), Some(run)) => run.extend(between.iter().copied().chain([stop])),
+            _ => runs.push(vec![stop]),
+        }
+    }
+    runs
+}
+
+/// What is put in between two poses; `None` where the arm has to leave off.
+fn edge(space: &Space<'_>, a: &Point, b: &Point) -> Option<Vec<Stop>> {
+    if space.is_reconfiguration(a, b) {
+        return None;
+    }
+    let stops = space.edge(a, b)?.into_iter().map(|point| Stop { point, pose: None });
+    Some(stops.collect())
 }

@@ -19,8 +19,8 @@ use rayon::prelude::*;
 
 use super::config::TaskConfig;
 use super::error::TaskError;
-use super::route::{PENALTY, Route, Task};
-use super::space::{Point, Space};
+use super::route::{PENALTY, Route, Task, Unsettled};
+use crate::poses::{Point, Space, Unmet};
 use crate::progress::Progress;
 
 /// Poses from which charts grow.
@@ -33,6 +33,11 @@ const ROOTS: usize = 8;
 const REACHED_FROM: usize = 6;
 /// Charts whose joint vectors enter the first round.
 const CHARTS: usize = 6;
+/// Another chart's joint vectors enter too where it reaches this part of the poses that no better one
+/// does, one over it, or a single pose where they are few.
+const COMPLEMENT: usize = 500;
+/// Charts that grow from poses that no other reaches.
+const GROWN: usize = 24;
 /// Most joint vectors of a pose in a round.
 const CHOICES: usize = 10;
 /// Joint vectors nearer than this are one. \[rad\]
@@ -52,11 +57,11 @@ pub(super) fn search(
     poses: &[Isometry3<f64>],
     config: &TaskConfig,
     progress: &dyn Progress,
-) -> Result<(Route, Vec<usize>), TaskError> {
+) -> Result<(Route, Vec<(usize, Unmet)>), TaskError> {
     let task = Task { space, poses, near: neighbours(poses) };
     progress.stage("charts", None);
     let roots = roots(&task, config.seed);
-    let mut charts: Vec<(usize, f64, Vec<Option<Point>>)> = roots
+    let mut charts: Vec<(usize, f64, Chart)> = roots
         .par_iter()
         .map(|&(pose, root)| {
             let chart = chart(&task, pose, root);
@@ -65,14 +70,11 @@ pub(super) fn search(
         })
         .collect();
     charts.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    charts.truncate(CHARTS);
     let mut choices: Vec<Vec<Point>> = vec![Vec::new(); poses.len()];
-    for (_, _, chart) in &charts {
-        for (choices, point) in choices.iter_mut().zip(chart) {
-            choices.extend(point.filter(|p| is_new(choices, p)));
-        }
+    for chart in chosen(charts) {
+        add(&mut choices, &chart);
     }
-    let unmet: Vec<usize> = (0..poses.len()).filter(|&k| choices[k].is_empty()).collect();
+    let unmet = rescue(&task, &mut choices);
     if unmet.len() == poses.len() {
         return Err(TaskError::NothingMet { poses: poses.len() });
     }
@@ -96,15 +98,63 @@ pub(super) fn search(
     Ok((route, unmet))
 }
 
+/// For each pose the joint vector that a chart has for it.
+type Chart = Vec<Option<Point>>;
+
+/// The best charts, in order, and of the others those that reach what no better one does.
+fn chosen(charts: Vec<(usize, f64, Chart)>) -> Vec<Chart> {
+    let count = charts.first().map_or(0, |(_, _, chart)| chart.len());
+    let mut reached = vec![false; count];
+    let mut chosen = Vec::new();
+    for (rank, (_, _, chart)) in charts.into_iter().enumerate() {
+        let new = chart.iter().zip(&reached).filter(|(p, reached)| p.is_some() && !**reached);
+        let new = new.count();
+        if rank < CHARTS || new >= (count / COMPLEMENT).max(1) {
+            reached.iter_mut().zip(&chart).for_each(|(reached, p)| *reached |= p.is_some());
+            chosen.push(chart);
+        }
+    }
+    chosen
+}
+
+fn add(choices: &mut [Vec<Point>], chart: &[Option<Point>]) {
+    for (choices, point) in choices.iter_mut().zip(chart) {
+        choices.extend(point.filter(|p| is_new(choices, p)));
+    }
+}
+
+/// What no chart reaches is looked for over all postures, and charts grow from what is found; the rest
+/// is not met, and why.
+fn rescue(task: &Task<'_>, choices: &mut [Vec<Point>]) -> Vec<(usize, Unmet)> {
+    let open: Vec<usize> = (0..choices.len()).filter(|&k| choices[k].is_empty()).collect();
+    let found: Vec<(usize, Result<Point, Unmet>)> =
+        open.into_par_iter().map(|pose| (pose, task.space.meet(&task.poses[pose]))).collect();
+    let mut unmet = Vec::new();
+    let mut grown = 0;
+    for (pose, found) in found {
+        match found {
+            Err(why) => unmet.push((pose, why)),
+            Ok(_) if !choices[pose].is_empty() => {}
+            Ok(point) if grown < GROWN => {
+                grown += 1;
+                add(choices, &chart(task, pose, point));
+            }
+            Ok(point) => choices[pose].push(point),
+        }
+    }
+    unmet
+}
+
 /// Relaxes the route and moves poses until neither gains.
 fn settle(task: &Task<'_>, route: &mut Route) {
+    let mut open = Unsettled::all(task.poses.len());
     for _ in 0..12 {
-        task.relax(route, SWEEPS);
-        if task.reinsert(route) < 1e-3 {
+        task.relax(route, &mut open, SWEEPS);
+        if task.reinsert(route, &mut open) < 1e-3 {
             break;
         }
     }
-    task.relax(route, 4 * SWEEPS);
+    task.relax(route, &mut open, 4 * SWEEPS);
 }
 
 /// For each pose the others, nearest first.
@@ -119,8 +169,13 @@ fn neighbours(poses: &[Isometry3<f64>]) -> Vec<Vec<usize>> {
         .map(|a| {
             let mut others: Vec<(f64, usize)> =
                 (0..poses.len()).filter(|&b| b != a).map(|b| (apart(a, b), b)).collect();
-            others.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-            others.truncate(NEIGHBOURS);
+            let nearer =
+                |x: &(f64, usize), y: &(f64, usize)| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1));
+            if others.len() > NEIGHBOURS {
+                others.select_nth_unstable_by(NEIGHBOURS, nearer);
+                others.truncate(NEIGHBOURS);
+            }
+            others.sort_by(nearer);
             others.into_iter().map(|(_, b)| b).collect()
         })
         .collect()
@@ -164,8 +219,8 @@ fn roots(task: &Task<'_>, seed: u64) -> Vec<(usize, Point)> {
 }
 
 /// The poses reached from one, each from the joint vector of a neighbour that was reached before.
-fn chart(task: &Task<'_>, root: usize, point: Point) -> Vec<Option<Point>> {
-    let mut chart: Vec<Option<Point>> = vec![None; task.poses.len()];
+fn chart(task: &Task<'_>, root: usize, point: Point) -> Chart {
+    let mut chart: Chart = vec![None; task.poses.len()];
     let mut tries = vec![0; task.poses.len()];
     chart[root] = Some(point);
     let mut open = std::collections::VecDeque::from([root]);

@@ -8,12 +8,14 @@ mod optimal;
 mod sampled;
 mod smooth;
 mod smooth_path;
+mod speed;
 
 pub use accelerate::{Pace, Rest, accelerate, paced};
 pub use bang_bang::{bang_bang, segment_ns, set_times};
 pub use sampled::{Timed, timed};
 pub use smooth::smooth;
 pub use smooth_path::{Piece, SmoothPath};
+pub use speed::Speed;
 
 use nullsweep_robot::{Arm, JointVector};
 

@@ -118,6 +118,13 @@ const BELOW_4: &[&str] = &[
     "tour", "motion", "fairing", "timing", "verify", "link",
 ];
 
+/// The same for those that go through given poses.
+#[rustfmt::skip]
+const WITH_POSES: &[&str] = &[
+    "progress", "cost", "workcell", "plan", "roadmap", "sweep",
+    "tour", "motion", "fairing", "timing", "verify", "link", "poses",
+];
+
 const PLANNER: &[(&str, &[&str])] = &[
     // 0
     ("progress", &[]),
@@ -135,9 +142,12 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("timing", BELOW_3),
     ("verify", &["progress", "cost", "workcell", "plan", "sweep"]),
     ("link", BELOW_3),
+    // given poses: what those who go through them share
+    ("poses", BELOW_4),
     // 4: none imports another
     ("pipeline", BELOW_4),
-    ("task", BELOW_4),
+    ("task", WITH_POSES),
+    ("follow", WITH_POSES),
     ("transit", BELOW_4),
 ];
 
@@ -157,7 +167,7 @@ pub(crate) const APART: &[(&str, &str, &[&str])] = &[
     (
         "planner/src",
         "verify",
-        &["roadmap", "tour", "motion", "fairing", "pipeline", "task", "transit"],
+        &["roadmap", "tour", "motion", "fairing", "pipeline", "poses", "task", "follow", "transit"],
     ),
     ("planner/src", "fairing", &["verify"]),
     ("planner/src", "roadmap", &["verify"]),
@@ -186,6 +196,8 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("ratatui", &["executor/src/top"]),
     ("indicatif", &["planner/cli"]),
     ("plotly", &["tests"]),
+    ("serde-saphyr", &["planner/src/poses/read"]),
+    ("gcode", &["planner/src/poses/read"]),
     ("mcap", &["planner/report", "planner/cli/tests"]),
     ("plotters", &["planner/experiment"]),
     ("comfy-table", &["planner/cli", "planner/experiment", "tests"]),

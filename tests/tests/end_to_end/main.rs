@@ -2,6 +2,7 @@
 //! its own. Nothing here asserts how fast anything is: these run on loaded machines too.
 
 mod common;
+mod follow;
 mod kill;
 mod mock;
 mod publish;

@@ -1,6 +1,6 @@
 //! The joint vectors that meet a pose within its tolerance.
 
-use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, UnitQuaternion, Vector3, Vector6};
 use nullsweep_collision::{ToolContact, World};
 use nullsweep_robot::{Arm, Jacobian, JointVector, MAX_DOF, Tool, damped_step, wrap};
 
@@ -9,28 +9,31 @@ use crate::sweep::distance_to_segment;
 
 /// The arm, its tool and its tolerances.
 #[derive(Clone, Copy)]
-pub(super) struct Space<'a> {
-    pub(super) arm: &'a Arm,
-    pub(super) world: &'a World,
-    pub(super) tolerance: &'a Tolerance,
+pub(crate) struct Space<'a> {
+    pub(crate) arm: &'a Arm,
+    pub(crate) world: &'a World,
+    pub(crate) tolerance: &'a Tolerance,
     contact_in_tip: Isometry3<f64>,
 }
 
 /// A joint vector and where it puts the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Point {
-    pub(super) q: JointVector,
-    pub(super) tool: Isometry3<f64>,
+pub(crate) struct Point {
+    pub(crate) q: JointVector,
+    pub(crate) tool: Isometry3<f64>,
 }
 
 /// Largest error of a met pose beyond its tolerance. \[m\] or \[rad\]
-pub(super) const RESIDUAL: f64 = 1e-7;
+pub(crate) const RESIDUAL: f64 = 1e-7;
 /// Steps of a projection.
 const STEPS: usize = 24;
 /// Longest step of a joint in a projection. \[rad\]
 const STRIDE: f64 = 0.4;
 /// Damping near singularities.
 const DAMPING: f64 = 1e-7;
+
+/// Damping of the null space's projector.
+const SINGULAR: f64 = 1e-9;
 
 /// From here on two configurations are different postures: no edge joins them. The measures of the
 /// arm-coverage planner of Wang and Gleicher (ICRA 2025).
@@ -42,7 +45,7 @@ const LINE_JUMP: f64 = 0.1;
 const SHORT: f64 = 0.4;
 
 impl<'a> Space<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         arm: &'a Arm,
         world: &'a World,
         tool: &Tool,
@@ -51,19 +54,26 @@ impl<'a> Space<'a> {
         Self { arm, world, tolerance, contact_in_tip: tool.contact_in_tip() }
     }
 
-    pub(super) fn point(&self, q: JointVector) -> Point {
+    pub(crate) fn point(&self, q: JointVector) -> Point {
         Point { q, tool: self.arm.tip_pose(&q) * self.contact_in_tip }
     }
 
+    /// Where the tip is when the tool is at a pose, turned about its own axis. \[rad\]
+    pub(crate) fn tip_at(&self, pose: &Isometry3<f64>, turn: f64) -> Isometry3<f64> {
+        let spin = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
+        pose * spin * self.contact_in_tip.inverse()
+    }
+
     /// How far the tool is beyond the tolerance, along and about the pose's axes.
-    pub(super) fn excess(&self, pose: &Isometry3<f64>, tool: &Isometry3<f64>) -> Vector6<f64> {
+    pub(crate) fn excess(&self, pose: &Isometry3<f64>, tool: &Isometry3<f64>) -> Vector6<f64> {
         let off = deviation(pose, tool);
-        Vector6::from_fn(|k, _| off[k] - off[k].clamp(-self.tolerance.0[k], self.tolerance.0[k]))
+        let met = self.tolerance.nearest(&off);
+        Vector6::from_fn(|k, _| off[k] - met[k])
     }
 
     /// A joint vector near `q` that meets the pose inside the margined limits: Newton steps of
     /// least norm onto what is exceeded.
-    pub(super) fn project(&self, pose: &Isometry3<f64>, q: &JointVector) -> Option<Point> {
+    pub(crate) fn project(&self, pose: &Isometry3<f64>, q: &JointVector) -> Option<Point> {
         let mut q = *q;
         self.clamp(&mut q);
         for _ in 0..STEPS {
@@ -79,14 +89,40 @@ impl<'a> Space<'a> {
         None
     }
 
+    /// As [`Self::project`], with the tool on the pose itself: only what may turn freely about its axis
+    /// still may.
+    pub(crate) fn on_line(&self, pose: &Isometry3<f64>, q: &JointVector) -> Option<Point> {
+        let spin = self.tolerance.0[5];
+        let exact =
+            Tolerance([0.0, 0.0, 0.0, 0.0, 0.0, if spin > 0.0 { f64::INFINITY } else { 0.0 }]);
+        Space { tolerance: &exact, ..*self }.project(pose, q)
+    }
+
     /// [`Self::project`] without collision of the arm with itself or with what is around it.
-    pub(super) fn project_free(&self, pose: &Isometry3<f64>, q: &JointVector) -> Option<Point> {
+    pub(crate) fn project_free(&self, pose: &Isometry3<f64>, q: &JointVector) -> Option<Point> {
         self.project(pose, q).filter(|point| self.is_free(point))
     }
 
     /// Whether the arm collides neither with itself nor with what is around it.
-    pub(super) fn is_free(&self, point: &Point) -> bool {
+    pub(crate) fn is_free(&self, point: &Point) -> bool {
         self.world.is_free(&point.q, ToolContact::Allowed)
+    }
+
+    /// The projector onto the joint motions that keep the tool where it meets a pose, as far as its
+    /// tolerance does not leave it free.
+    pub(crate) fn null_space(&self, pose: &Isometry3<f64>, at: &Point) -> SMatrix<f64, 8, 8> {
+        let (tip, mut jacobian) = self.arm.tip_pose_and_jacobian(&at.q);
+        self.turn_to_pose(pose, &tip, &at.tool, &mut jacobian);
+        for (mut row, tolerance) in jacobian.row_iter_mut().zip(self.tolerance.0) {
+            if tolerance > 0.0 {
+                row.fill(0.0);
+            }
+        }
+        let square = jacobian * jacobian.transpose() + Matrix6::identity() * SINGULAR;
+        let identity = SMatrix::identity();
+        square
+            .cholesky()
+            .map_or(identity, |square| identity - jacobian.transpose() * square.solve(&jacobian))
     }
 
     /// Turns the tip's Jacobian into that of the tool's deviation, near enough for small tilts.
@@ -150,7 +186,7 @@ impl<'a> Space<'a> {
 
     /// Whether the straight joint motion from one to the other is a change of posture rather than
     /// an edge along the tool's path.
-    pub(super) fn is_reconfiguration(&self, a: &Point, b: &Point) -> bool {
+    pub(crate) fn is_reconfiguration(&self, a: &Point, b: &Point) -> bool {
         let farthest = (0..MAX_DOF).map(|j| (b.q[j] - a.q[j]).abs()).fold(0.0, f64::max);
         if farthest > JOINT_JUMP {
             return true;
@@ -164,7 +200,7 @@ impl<'a> Space<'a> {
 
     /// How far the tool is from the straight line between its places at both ends, `share` of the
     /// way along the straight joint motion. \[m\]
-    pub(super) fn deviation_at(&self, a: &Point, b: &Point, share: f64) -> f64 {
+    pub(crate) fn deviation_at(&self, a: &Point, b: &Point, share: f64) -> f64 {
         let at = |point: &Point| Point3::from(point.tool.translation.vector);
         distance_to_segment(&at(&self.point(a.q.lerp(&b.q, share))), &at(a), &at(b))
     }
@@ -190,8 +226,6 @@ fn deviation(pose: &Isometry3<f64>, tool: &Isometry3<f64>) -> [f64; 6] {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::UnitQuaternion;
-
     use super::*;
 
     #[test]

@@ -1,0 +1,89 @@
+//! `planner follow`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nullsweep_planner::follow::{self, FollowConfig, FollowFigures};
+use nullsweep_planner::progress::Progress;
+
+use crate::bars::Bars;
+use crate::figures::{held_against, violations};
+use crate::given::{Drawn, GivenArgs, OutArgs, ReadArgs};
+use crate::numbers::Numbers;
+use crate::site::SiteArgs;
+
+#[derive(Debug, Args)]
+pub(super) struct FollowArgs {
+    /// The tool path: a table of poses (x,y,z,qx,qy,qz,qw a line, a time before it, a column `segment`),
+    /// YAML or JSON (a PoseArray, noether's tool paths), or G-code (straight cuts, G0 and G1).
+    path: PathBuf,
+    #[command(flatten)]
+    read: ReadArgs,
+    #[command(flatten)]
+    given: GivenArgs,
+    /// The most that a turning joint, and a sliding one, may move while the tool goes 1 cm or turns 3°:
+    /// what moves more has changed its posture. [rad], [m]
+    #[arg(long, value_name = "RAD,M", default_value = "0.12,0.02")]
+    step: Numbers<2>,
+    #[command(flatten)]
+    out: OutArgs,
+    #[command(flatten)]
+    site: SiteArgs,
+}
+
+pub(super) fn run(args: &FollowArgs) -> anyhow::Result<u8> {
+    args.out.writable()?;
+    let bars = Bars::new();
+    let given = &args.given;
+    let setting = given.setting(args.read.read(&args.path)?, args.site.site(), &bars)?;
+    let config = FollowConfig {
+        arm: given.robot.spec(),
+        tool: setting.tool.clone(),
+        tolerance: given.tolerance,
+        start: setting.start,
+        stance: setting.stance.clone(),
+        speed: setting.speed,
+        step: args.step.0,
+        collision: setting.collision.clone(),
+        seed: given.seed,
+    };
+    let outcome = follow::run(&setting.robot, &setting.segments, &setting.scene, &config, &bars);
+    bars.clear();
+    let outcome = outcome?;
+    for note in &outcome.figures.notes {
+        bars.note(note);
+    }
+    let (plan, verification) = (&outcome.plan, &outcome.verification);
+    let made = Drawn { setting: &setting, plan, verification, rows: rows(&outcome.figures) };
+    args.out.finish(&made, &outcome.figures)
+}
+
+/// The figures as name and value, for people.
+fn rows(f: &FollowFigures) -> Vec<[String; 2]> {
+    let mm = |metres: f64| format!("{:.3}", metres * 1e3);
+    let deviation = format!("{}, {} mm", mm(f.edge_deviation_p90_m), mm(f.edge_deviation_max_m));
+    let error =
+        format!("{} mm, {:.3}°", mm(f.position_error_max_m), f.angle_error_max_rad.to_degrees());
+    let step = format!("{:.2}°, {} mm", f.step_max_rad.to_degrees(), mm(f.step_max_m));
+    let sampled = format!(
+        "{:.2} rad, over {} joint vectors at {} places",
+        f.sampled_rad, f.samples, f.layers
+    );
+    vec![
+        ["segments".to_owned(), f.segments.to_string()],
+        ["poses, met".to_owned(), format!("{}, {}", f.poses, f.met)],
+        ["reconfigurations".to_owned(), f.reconfigurations.to_string()],
+        ["ways through free space".to_owned(), f.transfers.to_string()],
+        ["joint movement (L2)".to_owned(), format!("{:.2} rad", f.movement_rad)],
+        ["  least of the samples".to_owned(), sampled],
+        ["effort, transfers included".to_owned(), format!("{:.2} rad", f.effort_rad)],
+        ["task time".to_owned(), format!("{:.2} s", f.task_time_s)],
+        ["beyond the tolerance, max".to_owned(), error],
+        ["edge deviation, p90, max".to_owned(), deviation],
+        ["joint step, turning, sliding".to_owned(), step],
+        ["violations".to_owned(), violations(f.violations, &f.against.guessed_links)],
+        ["  against".to_owned(), held_against(&f.against)],
+        ["calculation".to_owned(), format!("{:.2} s", f.calc_time_s)],
+        ["verification".to_owned(), format!("{:.2} s", f.verify_time_s)],
+    ]
+}
