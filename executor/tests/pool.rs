@@ -1,5 +1,6 @@
 //! The real-time thread's heap: whatever it is asked for, blocks are apart, keep what is written into
-//! them, and go back to where they came from. Small enough for Miri (`MIRIFLAGS=-Zmiri-tree-borrows`), valgrind and a sanitizer.
+//! them, and go back to where they came from. Small enough for Miri (with `-Zmiri-tree-borrows`),
+//! valgrind and a sanitizer.
 
 #![allow(unsafe_code, reason = "an allocator is asked as a program asks it")]
 
