@@ -2,43 +2,13 @@
 
 use nullsweep_robot::{Arm, Robot};
 use nullsweep_surface::Patch;
-use serde::{Deserialize, Serialize};
 
 use super::error::PipelineError;
 use super::job::Job;
 use super::left_out::LeftOut;
+use super::other::{FreeFrom, Other};
 use super::setting::Setting;
-use crate::workcell::stance::{Stance, told};
 use crate::workcell::{Cause, Scene, reach};
-
-/// A stance that was tried, and which patches it reaches in a sketch of the scene.
-pub(super) struct Other {
-    pub(super) stance: Stance,
-    pub(super) reached: Vec<bool>,
-}
-
-/// Patches that are free from another stance.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FreeFrom {
-    /// The stance.
-    #[serde(flatten)]
-    pub stance: Stance,
-    /// How many of those that are left out.
-    pub patches: usize,
-}
-
-impl std::fmt::Display for FreeFrom {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "from base {}", told(&self.stance.base))?;
-        for (joint, value) in &self.stance.held {
-            write!(f, ", {joint} {value}")?;
-        }
-        match self.patches {
-            1 => f.write_str(" 1 patch is free"),
-            n => write!(f, " {n} patches are free"),
-        }
-    }
-}
 
 /// What a stance is looked at in: scene and patches in the floor frame.
 pub(super) struct Floor<'a> {
@@ -52,10 +22,10 @@ pub(super) struct Floor<'a> {
 /// Says in the rows of what the arm meets something at how much of it is free from the one other stance
 /// that promises most: what it reaches of it among all that is there.
 pub(super) fn advise(
-    rows: &mut [LeftOut],
+    mut rows: Vec<LeftOut>,
     others: &[Other],
     floor: &Floor<'_>,
-) -> Result<(), PipelineError> {
+) -> Result<Vec<LeftOut>, PipelineError> {
     let Floor { robot, arm, scene, patches, job } = *floor;
     let blocked: Vec<usize> =
         rows.iter().filter(|row| meets(&row.cause)).flat_map(|row| row.of.clone()).collect();
@@ -65,10 +35,10 @@ pub(super) fn advise(
     };
     // The first of those that are alike: they come best first.
     let best = others.iter().rev().max_by_key(|other| promises(other));
-    let Some(best) = best.filter(|other| promises(other) > 0) else { return Ok(()) };
+    let Some(best) = best.filter(|other| promises(other) > 0) else { return Ok(rows) };
     let setting = Setting::new(robot, arm, scene, patches, job, best.stance.clone())?;
     if !setting.can_stand(job) {
-        return Ok(());
+        return Ok(rows);
     }
     let promised: Vec<usize> = blocked.into_iter().filter(|&patch| best.reached[patch]).collect();
     let looked: Vec<Patch> = promised.iter().map(|&patch| setting.patches[patch].clone()).collect();
@@ -82,7 +52,7 @@ pub(super) fn advise(
         let stance = best.stance.clone();
         row.free_from = (patches > 0).then_some(FreeFrom { stance, patches });
     }
-    Ok(())
+    Ok(rows)
 }
 
 /// Whether something is in the arm's way.

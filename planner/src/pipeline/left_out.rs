@@ -6,7 +6,7 @@ use nullsweep_surface::{Patch, Scan};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::elsewhere::FreeFrom;
+use super::other::FreeFrom;
 use crate::workcell::{Cause, Workcell, obstruction};
 
 /// All that one cause keeps from being swept.

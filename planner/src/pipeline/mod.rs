@@ -11,14 +11,15 @@ mod figures;
 mod job;
 mod joint_order;
 mod left_out;
+mod other;
 mod run;
 mod setting;
 mod start;
 mod swept;
 
-pub use elsewhere::FreeFrom;
 pub use error::PipelineError;
 pub use figures::Figures;
 pub use job::{After, End, Job, StanceChoice};
 pub use left_out::LeftOut;
+pub use other::FreeFrom;
 pub use run::{Outcome, run};

@@ -60,14 +60,13 @@ pub fn run(
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
-    let surface = &scene.surface;
     let all = clock.time("patches", || {
-        let found = patches::find(surface, &job.patches, job.seed);
+        let found = patches::find(&scene.surface, &job.patches, job.seed);
         let bed = Bed::new(scene, &job.tool);
         found.into_par_iter().filter_map(|patch| bed.laid(patch)).collect::<Vec<_>>()
     });
     if all.is_empty() {
-        return Err(PipelineError::NoPatches { points: surface.points.len() });
+        return Err(PipelineError::NoPatches { points: scene.surface.points.len() });
     }
 
     progress.stage("stance", None);
@@ -123,9 +122,8 @@ pub fn run(
         dropped: &sequence.dropped,
         swept: &verification.swept,
     };
-    let mut left_out = clock.time("causes", || left_out(cell, &known));
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
-    clock.time("causes", || advise(&mut left_out, &others, &floor))?;
+    let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {

@@ -5,10 +5,10 @@ use nullsweep_robot::{Arm, Robot};
 use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
-use super::elsewhere::Other;
 use super::error::PipelineError;
 use super::job::{Job, StanceChoice};
 use super::left_out::{Known, in_words, left_out};
+use super::other::Other;
 use super::start::start;
 use crate::roadmap::{GraphConfig, Nodes, graph};
 use crate::workcell::stance::{self, Stance, StanceSearch};

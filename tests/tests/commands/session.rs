@@ -40,11 +40,7 @@ impl Session {
     pub(crate) fn new(root: &Path) -> Self {
         let folder = TempDir::with_prefix("nullsweep-commands-").expect("a folder");
         let (sample, copy) = (root.join("examples/sample"), folder.path().join("examples/sample"));
-        fs::create_dir_all(&copy).expect("a folder");
-        for entry in fs::read_dir(sample).expect("samples") {
-            let entry = entry.expect("an entry");
-            fs::copy(entry.path(), copy.join(entry.file_name())).expect("copied");
-        }
+        copy_all(&sample, &copy);
         // Apart from whatever else runs on this machine.
         let cell = copy.join("cell.toml");
         let text = fs::read_to_string(&cell).expect("a cell");
@@ -185,4 +181,18 @@ pub(crate) fn help(words: &[String]) -> String {
     command.arg(format!("__{}", words[0])).args(&words[1..]).arg("--help");
     let output = command.env(nullsweep_cell::VARIABLE, "").output().expect("it starts");
     String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Copies a folder with all that is in it.
+fn copy_all(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("a folder");
+    for entry in fs::read_dir(from).expect("a folder") {
+        let entry = entry.expect("an entry");
+        let (path, copy) = (entry.path(), to.join(entry.file_name()));
+        if path.is_dir() {
+            copy_all(&path, &copy);
+        } else {
+            fs::copy(path, copy).expect("copied");
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use gcode::{Block, Code, Value};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::{Poses, PosesError};
+use super::found::{Poses, PosesError};
 
 /// What is read.
 const WANTED: &str = "straight motion, G0 and G1, in G17, G20, G21, G90 or G91";
@@ -15,6 +15,8 @@ const PASSED: [&str; 18] = [
     "4", "17", "40", "49", "54", "55", "56", "57", "58", "59", "61", "64", "69", "80", "93", "94",
     "95", "97",
 ];
+/// Digits before the point that a number may have: the parser counts G, M and T by tenths in 32 bits.
+const DIGITS: usize = 8;
 /// An inch. \[m\]
 const INCH: f64 = 0.0254;
 
@@ -31,6 +33,10 @@ struct Machine {
 /// Poses of the tool along G1 motions, its z axis down (−z of the program), its x axis along the
 /// program's. Where G0 goes the tool is off the part: a segment ends there.
 pub(super) fn read(text: &str, path: &Path) -> Result<Poses, PosesError> {
+    if let Some(line) = text.lines().position(has_a_number_too_large) {
+        let what = format!("a number of more than {DIGITS} digits before its point");
+        return Err(PosesError::Line { path: path.into(), line: line + 1, what, wanted: WANTED });
+    }
     let program = gcode::parse(text).map_err(|all| {
         let what = all.iter().next().map_or_else(String::new, ToString::to_string);
         PosesError::Syntax { path: path.into(), what }
@@ -92,6 +98,14 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Poses, PosesError> {
         notes.push(format!("{file}: {offsets}: where its origin is, --offset says"));
     }
     Ok(Poses { segments, notes })
+}
+
+/// Whether a letter has a number with more than [`DIGITS`] digits before its point.
+fn has_a_number_too_large(line: &str) -> bool {
+    line.split(|c: char| c.is_ascii_alphabetic()).skip(1).any(|word| {
+        let whole = word.split('.').next().unwrap_or(word);
+        whole.chars().filter(char::is_ascii_digit).count() > DIGITS
+    })
 }
 
 impl Machine {
@@ -189,6 +203,8 @@ mod tests {
             ("G91\nG0 X1\n", 2),
             ("G0 X0 Y0 Z0\nG1 A30\n", 2),
             ("G28\n", 1),
+            ("G21\nG429496730 X1\n", 2),
+            ("G0 X0 Y0 Z0\nM 99999999999\n", 2),
         ] {
             match cuts(text) {
                 Err(PosesError::Line { line: found, .. }) => assert_eq!(found, line, "{text}"),

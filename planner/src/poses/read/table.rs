@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use super::quaternion::{Quaternions, isometry};
-use super::{Poses, PosesError, QuaternionOrder};
+use super::found::{Poses, PosesError};
+use super::quaternion::{QuaternionOrder, Quaternions, isometry};
 
 /// What is wanted of a line.
 const WANTED: &str = "one pose a line: time,x,y,z,qx,qy,qz,qw or x,y,z,qx,qy,qz,qw";

@@ -5,8 +5,8 @@ use std::path::Path;
 use nalgebra::Isometry3;
 use serde_json::{Map, Value};
 
-use super::quaternion::{Quaternions, isometry};
-use super::{Poses, PosesError, QuaternionOrder};
+use super::found::{Poses, PosesError};
+use super::quaternion::{QuaternionOrder, Quaternions, isometry};
 
 /// In which a tree is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
