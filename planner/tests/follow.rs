@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options, ToolContact, World};
 use nullsweep_planner::follow::{self, FollowConfig, FollowError, FollowOutcome};
 use nullsweep_planner::plan::{Plan, Profile};
-use nullsweep_planner::poses::{self, QuaternionOrder, ReadOptions, Tolerance};
+use nullsweep_planner::poses::{self, QuaternionOrder, ReadOptions, Setup, SetupError, Tolerance};
 use nullsweep_planner::progress::{Progress, Silent};
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
@@ -17,7 +17,7 @@ use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::{Arm, ArmSpec, Geometry, Robot, Side, Tool};
 
 fn config() -> FollowConfig {
-    FollowConfig {
+    let setup = Setup {
         arm: ArmSpec::pr2(Side::Right),
         // Poses of the gripper's tool frame, its x axis ahead.
         tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
@@ -25,10 +25,15 @@ fn config() -> FollowConfig {
         stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
         start: None,
         speed: Speed::default(),
-        step: FollowConfig::STEP,
         collision: Options::default(),
         seed: 1,
-    }
+    };
+    FollowConfig { setup, step: FollowConfig::STEP }
+}
+
+/// Another one, met as [`config`] says but for what is given.
+fn with(setup: Setup) -> FollowConfig {
+    FollowConfig { setup, ..config() }
 }
 
 fn arm() -> Arm {
@@ -142,7 +147,7 @@ fn the_least_movement_is_found_among_the_null_space_motions() {
     let outcome = run(&segments, &nothing(), &config());
     // Whoever holds the upper-arm roll, at any value, and follows by the closed form moves more.
     let arm = arm();
-    let contact = config().tool.contact_in_tip().inverse();
+    let contact = config().setup.tool.contact_in_tip().inverse();
     let mut best = f64::INFINITY;
     for roll in -40..=10 {
         let mut solutions = nullsweep_robot::Solutions::new();
@@ -189,7 +194,7 @@ fn what_is_in_the_way_is_gone_round_with_the_path_kept() {
     let world = World::new(
         &robot,
         &self::arm(),
-        &config().tool,
+        &config().setup.tool,
         scene.points(),
         &scene.obstacles,
         &collision,
@@ -203,7 +208,7 @@ fn what_is_in_the_way_is_gone_round_with_the_path_kept() {
 /// Whether any joint vector meets a pose free of collision.
 fn is_met(pose: &Isometry3<f64>, world: &World) -> bool {
     let arm = arm();
-    let tip = pose * config().tool.contact_in_tip().inverse();
+    let tip = pose * config().setup.tool.contact_in_tip().inverse();
     let mut solutions = nullsweep_robot::Solutions::new();
     (-40..=10).any(|roll| {
         arm.ik().solve(&tip, 0.1 * f64::from(roll), &mut solutions);
@@ -254,7 +259,7 @@ fn what_cannot_be_met_is_left_out_and_told_and_the_rest_is_followed() {
 fn a_path_begins_where_the_arm_is_and_keeps_accelerations_and_the_tool_speed() {
     let start = arm().home();
     let speed = Speed { profile: Profile::Acceleration, tool: Some(0.05), ..Speed::default() };
-    let config = FollowConfig { start: Some(start), speed, ..config() };
+    let config = with(Setup { start: Some(start), speed, ..config().setup });
     let segments = raster(2);
     let outcome = run(&segments, &nothing(), &config);
     let plan = &outcome.plan;
@@ -268,10 +273,10 @@ fn a_path_begins_where_the_arm_is_and_keeps_accelerations_and_the_tool_speed() {
     // A start beyond a limit is told.
     let mut beyond = start;
     beyond[3] = 0.2;
-    let beyond = FollowConfig { start: Some(beyond), ..config };
+    let beyond = with(Setup { start: Some(beyond), ..config.setup });
     let result = follow::run(&Robot::pr2(), &segments, &nothing(), &beyond, &Silent);
     assert!(
-        matches!(&result, Err(FollowError::Start { why }) if why.contains("r_elbow_flex_joint")),
+        matches!(&result, Err(FollowError::Setup(SetupError::Start { why })) if why.contains("r_elbow_flex_joint")),
         "{result:?}"
     );
 }
@@ -289,7 +294,7 @@ fn tolerance_saves_movement_and_is_kept() {
     let segments = raster(1);
     let exact = run(&segments, &nothing(), &config()).figures.movement_rad;
     let cone = Tolerance([0.0, 0.0, 0.0, 0.2, 0.2, f64::INFINITY]);
-    let loose = FollowConfig { tolerance: cone, ..config() };
+    let loose = with(Setup { tolerance: cone, ..config().setup });
     let outcome = run(&segments, &nothing(), &loose);
     assert!(outcome.figures.movement_rad < 0.9 * exact, "{:?}", outcome.figures);
     let (arm, contact) = (arm(), outcome.plan.tool.contact_in_tip());
@@ -392,12 +397,12 @@ fn published_paths_are_followed_without_a_jump() {
         let scene = Scene::of_obstacles(boxes.iter().map(one).collect());
         let options = ReadOptions { order: Some(QuaternionOrder::Wxyz), offset };
         let segments = poses::read(&data.join("toolpaths").join(path), &options).unwrap().segments;
-        let config = FollowConfig {
+        let config = with(Setup {
             arm: ArmSpec { base: base.into(), tip: tip.into() },
             tool: poses::tip_tool(),
             collision: Options { fit_capsules: Some(0.05), ..Options::default() },
-            ..config()
-        };
+            ..config().setup
+        });
         let outcome = follow::run(&robot, &segments, &scene, &config, &Silent).expect(&name);
         assert_eq!(outcome.verification.violations, [], "{name}");
         let figures = &outcome.figures;
@@ -432,12 +437,12 @@ fn a_turn_beyond_a_joints_range_is_one_reconfiguration() {
     let robot = Robot::from_urdf_file(&data.join("coverage-tasks/panda.urdf")).unwrap();
     let path = data.join("reports/line_with_turn.csv");
     let segments = poses::read(&path, &ReadOptions::default()).unwrap().segments;
-    let config = FollowConfig {
+    let config = with(Setup {
         arm: ArmSpec { base: "world".into(), tip: "panda_hand".into() },
         tool: poses::tip_tool(),
         collision: Options { fit_capsules: Some(0.05), ..Options::default() },
-        ..config()
-    };
+        ..config().setup
+    });
     let outcome = follow::run(&robot, &segments, &nothing(), &config, &Silent).unwrap();
     assert_eq!(outcome.verification.violations, []);
     assert!(outcome.figures.met >= 199, "{:?}", outcome.figures);

@@ -10,7 +10,7 @@ use std::path::Path;
 use nullsweep_collision::Options;
 use nullsweep_planner::pipeline::{End, Job, StanceChoice, run};
 use nullsweep_planner::plan::{CostKind, Method, Profile};
-use nullsweep_planner::poses::{self, Tolerance};
+use nullsweep_planner::poses::{self, Setup, Tolerance};
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::task::{self, TaskConfig};
@@ -183,7 +183,7 @@ fn given_poses_are_planned_as_ever() {
     if !comparable() {
         return;
     }
-    let config = TaskConfig {
+    let setup = Setup {
         arm: ArmSpec::pr2(Side::Right),
         tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
         tolerance: Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]),
@@ -191,10 +191,9 @@ fn given_poses_are_planned_as_ever() {
         start: None,
         speed: Speed::default(),
         collision: Options::default(),
-        rounds: 2,
-        trials: 10,
         seed: 1,
     };
+    let config = TaskConfig { setup, rounds: 2, trials: 10 };
     let outcome = task::run(
         &Robot::pr2(),
         &common::dome(),

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use nalgebra::{Isometry3, Point3, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options};
 use nullsweep_planner::plan::Profile;
-use nullsweep_planner::poses::{self, ReadOptions, Tolerance};
+use nullsweep_planner::poses::{self, ReadOptions, Setup, SetupError, Tolerance};
 use nullsweep_planner::progress::{Progress, Silent};
 use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome};
 use nullsweep_planner::timing::Speed;
@@ -17,7 +17,7 @@ use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::{ArmSpec, Geometry, Robot, Side, Tool};
 
 fn config(tolerance: Tolerance) -> TaskConfig {
-    TaskConfig {
+    let setup = Setup {
         arm: ArmSpec::pr2(Side::Right),
         // Poses of the gripper's tool frame, its x axis ahead.
         tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
@@ -26,10 +26,14 @@ fn config(tolerance: Tolerance) -> TaskConfig {
         start: None,
         speed: Speed::default(),
         collision: Options::default(),
-        rounds: 2,
-        trials: 10,
         seed: 1,
-    }
+    };
+    TaskConfig { setup, rounds: 2, trials: 10 }
+}
+
+/// Another one, met as is given.
+fn with(setup: Setup) -> TaskConfig {
+    TaskConfig { setup, ..config(Tolerance::AXIS) }
 }
 
 /// Not even a floor.
@@ -47,7 +51,7 @@ fn every_pose_is_met_and_tolerance_saves_movement() {
     let exact = plan(Tolerance::AXIS);
     let loose = plan(Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]));
     let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).unwrap();
-    let contact = config(Tolerance::AXIS).tool.contact_in_tip();
+    let contact = config(Tolerance::AXIS).setup.tool.contact_in_tip();
     for (outcome, reach) in [(&exact, 1e-6), (&loose, 0.02 + 1e-6)] {
         assert_eq!(outcome.verification.violations, []);
         assert_eq!((outcome.figures.met, outcome.figures.reconfigurations), (25, 0));
@@ -71,7 +75,7 @@ fn every_pose_is_met_and_tolerance_saves_movement() {
 fn a_seed_gives_the_same_plan() {
     let (one, two) = (plan(Tolerance::AXIS), plan(Tolerance::AXIS));
     assert_eq!(one.plan, two.plan);
-    let other = TaskConfig { seed: 2, ..config(Tolerance::AXIS) };
+    let other = with(Setup { seed: 2, ..config(Tolerance::AXIS).setup });
     let other = task::run(&Robot::pr2(), &common::dome(), &nothing(), &other, &Silent).unwrap();
     assert_ne!(one.plan.knots, other.plan.knots);
 }
@@ -95,12 +99,12 @@ fn the_wok_takes_less_than_forty_radians() {
         .unwrap()
         .all();
     let robot = Robot::from_urdf_file(&data.join("ur5.urdf")).unwrap();
-    let config = TaskConfig {
+    let config = with(Setup {
         arm: ArmSpec { base: "base_link".into(), tip: "tool_tip".into() },
         tool: poses::tip_tool(),
         collision: Options { fit_capsules: Some(0.05), ..Options::default() },
-        ..config("0.05,0.05,0,0,0,free".parse().unwrap())
-    };
+        ..config("0.05,0.05,0,0,0,free".parse().unwrap()).setup
+    });
     let outcome = task::run(&robot, &poses, &nothing(), &config, &Silent).unwrap();
     let figures = &outcome.figures;
     println!("{figures:?}");
@@ -122,12 +126,12 @@ fn postures_that_complement_each_other_meet_all_poses() {
     let path = data.join("reports/line_with_turn.csv");
     let poses = poses::read(&path, &ReadOptions::default()).unwrap().all();
     let robot = Robot::from_urdf_file(&data.join("coverage-tasks/panda.urdf")).unwrap();
-    let config = TaskConfig {
+    let config = with(Setup {
         arm: ArmSpec { base: "world".into(), tip: "panda_hand".into() },
         tool: poses::tip_tool(),
         collision: Options { fit_capsules: Some(0.05), ..Options::default() },
-        ..config(Tolerance([0.0; 6]))
-    };
+        ..config(Tolerance([0.0; 6])).setup
+    });
     let outcome = task::run(&robot, &poses, &nothing(), &config, &Silent).unwrap();
     assert_eq!(outcome.verification.violations, []);
     assert!(outcome.figures.met >= 199, "{:?}", outcome.figures);
@@ -205,7 +209,7 @@ fn a_scene_is_where_the_robot_does_not_stand() {
     let base = [1.0, -2.0, 0.7];
     let stance = Stance { base, height: 0.0, held: Vec::new() };
     let scene = at_the_elbow(&plan(Tolerance::AXIS)).transformed(&stance.pose());
-    let moved = TaskConfig { stance, ..config(Tolerance::AXIS) };
+    let moved = with(Setup { stance, ..config(Tolerance::AXIS).setup });
     let outcome = task::run(&Robot::pr2(), &common::dome(), &scene, &moved, &Silent).unwrap();
     assert_eq!(outcome.plan.base, base);
     assert_eq!(verified(&outcome, &scene), 0);
@@ -219,7 +223,7 @@ fn a_scene_is_where_the_robot_does_not_stand() {
     let scene = Scene { obstacles: vec![wall], ..nothing() };
     let result = task::run(&Robot::pr2(), &common::dome(), &scene, &moved, &Silent);
     assert!(
-        matches!(&result, Err(TaskError::StanceHit { hit }) if hit.contains("wall")),
+        matches!(&result, Err(TaskError::Setup(SetupError::StanceHit { hit })) if hit.contains("wall")),
         "{result:?}"
     );
 }
@@ -229,17 +233,17 @@ fn a_task_begins_where_the_arm_is_and_keeps_its_accelerations() {
     let robot = Robot::pr2();
     let arm = robot.arm(&ArmSpec::pr2(Side::Right)).unwrap();
     let start = arm.home();
-    let from_home = TaskConfig {
+    let from_home = with(Setup {
         start: Some(start),
         speed: Speed { profile: Profile::Acceleration, ..Speed::default() },
-        ..config(Tolerance::AXIS)
-    };
+        ..config(Tolerance::AXIS).setup
+    });
     let outcome = task::run(&robot, &common::dome(), &nothing(), &from_home, &Silent).unwrap();
     assert_eq!(outcome.verification.violations, []);
     let knots = &outcome.plan.knots;
     assert_eq!((knots[0].q, knots[0].line), (start, None));
     assert_eq!(outcome.plan.profile, Profile::Acceleration);
-    let contact = from_home.tool.contact_in_tip();
+    let contact = from_home.setup.tool.contact_in_tip();
     let met = knots.iter().filter_map(|knot| Some((knot, knot.patch?)));
     let mut poses: Vec<u32> = met
         .map(|(knot, pose)| {
@@ -254,10 +258,10 @@ fn a_task_begins_where_the_arm_is_and_keeps_its_accelerations() {
     // A start beyond a limit, or in the scene, is told.
     let mut beyond = start;
     beyond[3] = 0.2;
-    let beyond = TaskConfig { start: Some(beyond), ..config(Tolerance::AXIS) };
+    let beyond = with(Setup { start: Some(beyond), ..config(Tolerance::AXIS).setup });
     let result = task::run(&robot, &common::dome(), &nothing(), &beyond, &Silent);
     assert!(
-        matches!(&result, Err(TaskError::Start { why }) if why.contains("r_elbow_flex_joint")),
+        matches!(&result, Err(TaskError::Setup(SetupError::Start { why })) if why.contains("r_elbow_flex_joint")),
         "{result:?}"
     );
 }

@@ -11,6 +11,7 @@ use nullsweep_planner::link::publish::PublishError;
 use nullsweep_planner::link::replan::ReplanError;
 use nullsweep_planner::pipeline::PipelineError;
 use nullsweep_planner::plan::PlanError;
+use nullsweep_planner::poses::SetupError;
 use nullsweep_planner::task::TaskError;
 use nullsweep_planner::transit::{Place, TransitError};
 use nullsweep_surface::ScanError;
@@ -133,9 +134,8 @@ fn pipeline(error: &PipelineError) -> Option<String> {
 fn task(error: &TaskError) -> Option<String> {
     match error {
         TaskError::NothingMet { .. } => Some(NOTHING_MET.into()),
-        TaskError::StanceHit { .. } => Some(STANDS_IN.into()),
-        TaskError::Start { .. } | TaskError::NoWay { .. } => Some("give another --start".into()),
-        TaskError::Collision(error) => collision(error),
+        TaskError::NoWay { .. } => Some(ANOTHER_START.into()),
+        TaskError::Setup(error) => setup(error),
         _ => None,
     }
 }
@@ -143,18 +143,26 @@ fn task(error: &TaskError) -> Option<String> {
 fn follow(error: &FollowError) -> Option<String> {
     match error {
         FollowError::NothingMet { .. } => Some(NOTHING_MET.into()),
-        FollowError::StanceHit { .. } => Some(STANDS_IN.into()),
-        FollowError::Start { .. } | FollowError::NoWay { .. } => {
-            Some("give another --start".into())
-        }
-        FollowError::Collision(error) => collision(error),
-        _ => None,
+        FollowError::NoWay { .. } => Some(ANOTHER_START.into()),
+        FollowError::Setup(error) => setup(error),
+        FollowError::Verify(_) => None,
     }
 }
 
-/// Where given poses are out of reach, and where the robot stands in something.
+fn setup(error: &SetupError) -> Option<String> {
+    match error {
+        SetupError::StanceHit { .. } => Some(STANDS_IN.into()),
+        SetupError::Start { .. } => Some(ANOTHER_START.into()),
+        SetupError::Collision(error) => collision(error),
+        SetupError::Arm(_) => None,
+    }
+}
+
+/// Where given poses are out of reach, where no way leads to them, and where the robot stands in
+/// something.
 const NOTHING_MET: &str = "--arm BASE,TIP names the tip link, --offset moves the poses, --quat wxyz \
                            reads quaternions with the scalar first; --floor says how high the floor is";
+const ANOTHER_START: &str = "give another --start";
 const STANDS_IN: &str = "--base says where in the scene the robot stands; space that no scan has seen \
                          counts as free with --unseen free";
 
@@ -293,7 +301,11 @@ mod tests {
                 looked: "nowhere else".into(),
             },
         };
-        for advice in [of(mesh()), of(PipelineError::from(mesh())), of(TaskError::from(mesh()))] {
+        for advice in [
+            of(mesh()),
+            of(PipelineError::from(mesh())),
+            of(TaskError::from(SetupError::from(mesh()))),
+        ] {
             assert!(advice.starts_with("--package gripper=FOLDER"), "{advice}");
             assert!(advice.contains("--fit-capsules"), "{advice}");
         }

@@ -34,19 +34,8 @@ pub(super) struct FollowArgs {
 pub(super) fn run(args: &FollowArgs) -> anyhow::Result<u8> {
     args.out.writable()?;
     let bars = Bars::new();
-    let given = &args.given;
-    let setting = given.setting(args.read.read(&args.path)?, args.site.site(), &bars)?;
-    let config = FollowConfig {
-        arm: given.robot.spec(),
-        tool: setting.tool.clone(),
-        tolerance: given.tolerance,
-        start: setting.start,
-        stance: setting.stance.clone(),
-        speed: setting.speed,
-        step: args.step.0,
-        collision: setting.collision.clone(),
-        seed: given.seed,
-    };
+    let setting = args.given.setting(args.read.read(&args.path)?, args.site.site(), &bars)?;
+    let config = FollowConfig { setup: setting.setup.clone(), step: args.step.0 };
     let outcome = follow::run(&setting.robot, &setting.segments, &setting.scene, &config, &bars);
     bars.clear();
     let outcome = outcome?;

@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use nalgebra::Isometry3;
-use nullsweep_collision::{Obstacle, Options};
+use nullsweep_collision::Obstacle;
 use nullsweep_planner::link::Site;
 use nullsweep_planner::plan::Plan;
-use nullsweep_planner::poses::{self, Poses, QuaternionOrder, ReadOptions, Tolerance};
+use nullsweep_planner::poses::{self, Poses, QuaternionOrder, ReadOptions, Setup, Tolerance};
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::Verification;
-use nullsweep_planner::workcell::{Scene, Stance};
+use nullsweep_planner::workcell::Scene;
 use nullsweep_report::{self as report, ReportData};
-use nullsweep_robot::{Arm, JointVector, Robot, Tool};
+use nullsweep_robot::{Arm, Robot, Tool};
 use serde::Serialize;
 
 use crate::bars::Bars;
@@ -58,14 +58,14 @@ pub(super) struct GivenArgs {
     #[arg(default_value_t = 0.0)]
     stand_off: f64,
     #[command(flatten)]
-    pub(super) robot: RobotArgs,
+    robot: RobotArgs,
     /// The tool, a TOML file, whose contact frame meets the poses; without it the tip frame itself.
     #[arg(long, value_name = "FILE")]
     tool: Option<PathBuf>,
     /// How far the tool may be from a pose, along and about its axes: X,Y,Z,RX,RY,RZ, in metres
     /// and radians or `free`. RX and RY are the half angles of the cone that its z axis may tilt in.
     #[arg(long, value_name = "TOLERANCE", default_value = "0,0,0,0,0,free")]
-    pub(super) tolerance: Tolerance,
+    tolerance: Tolerance,
     /// Scan files of what is around the arm, or one scene file that `planner scene` wrote: all that
     /// was measured is in the way, but for the tool at a pose. The option may be given several times.
     #[arg(long = "scene", value_name = "FILE")]
@@ -107,7 +107,7 @@ pub(super) struct GivenArgs {
     v_max: Option<f64>,
     /// Seed of every random choice: the same seed gives the same plan.
     #[arg(long, default_value_t = 1)]
-    pub(super) seed: u64,
+    seed: u64,
 }
 
 /// What is written of a plan.
@@ -128,12 +128,8 @@ pub(super) struct OutArgs {
 pub(super) struct Setting {
     pub(super) robot: Robot,
     arm: Arm,
-    pub(super) tool: Tool,
     pub(super) scene: Scene,
-    pub(super) collision: Options,
-    pub(super) stance: Stance,
-    pub(super) start: Option<JointVector>,
-    pub(super) speed: Speed,
+    pub(super) setup: Setup,
     /// Of the tool in the robot's root frame.
     pub(super) segments: Vec<Vec<Isometry3<f64>>>,
 }
@@ -170,8 +166,18 @@ impl GivenArgs {
             jerk: self.jerk.as_ref().map(|jerk| jerk.of(&arm)).transpose()?,
             tool: self.tool_speed,
         };
-        let collision = self.robot.collision();
-        Ok(Setting { robot, arm, tool, scene, collision, stance, start, speed, segments })
+        let (tolerance, collision) = (self.tolerance, self.robot.collision());
+        let setup = Setup {
+            arm: self.robot.spec(),
+            tool,
+            tolerance,
+            stance,
+            start,
+            speed,
+            collision,
+            seed: self.seed,
+        };
+        Ok(Setting { robot, arm, scene, setup, segments })
     }
 
     /// What is around the arm, in the floor frame: with nothing scanned the floor, and what is placed.
@@ -212,7 +218,7 @@ impl Drawn<'_> {
             plans: std::slice::from_ref(self.plan),
             robot: &setting.robot,
             arm: &setting.arm,
-            collision: &setting.collision,
+            collision: &setting.setup.collision,
             scene: Some(&setting.scene),
             verification: Some(self.verification),
             flights: &[],

@@ -67,16 +67,9 @@ impl PoseArgs {
     pub(super) fn work(&self, poses: Poses, site: Site<'_>, bars: &Bars) -> anyhow::Result<Made> {
         let setting = self.given.setting(poses, site, bars)?;
         let config = TaskConfig {
-            arm: self.given.robot.spec(),
-            tool: setting.tool.clone(),
-            tolerance: self.given.tolerance,
-            start: setting.start,
-            stance: setting.stance.clone(),
-            speed: setting.speed,
-            collision: setting.collision.clone(),
+            setup: setting.setup.clone(),
             rounds: self.rounds.max(1),
             trials: self.trials.max(1),
-            seed: self.given.seed,
         };
         let poses = setting.segments.concat();
         let outcome = task::run(&setting.robot, &poses, &setting.scene, &config, bars);

@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use nalgebra::Isometry3;
-use nullsweep_collision::World;
 use nullsweep_robot::{JointVector, Robot};
 use rayon::prelude::*;
 
@@ -16,7 +15,7 @@ use super::smooth::smooth;
 use super::station::{Station, stations};
 use crate::cost::{self, Effort};
 use crate::plan::Plan;
-use crate::poses::{self, Along, Piece, Point, Space, Stop, Unmet, tell_unmet, why_not_start};
+use crate::poses::{self, Along, Piece, Point, Space, Standing, Stop, Unmet, tell_unmet};
 use crate::progress::{Progress, left_out};
 use crate::verify::{Given, Verification, verify};
 use crate::workcell::{Scene, Workcell};
@@ -48,27 +47,18 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<FollowOutcome, FollowError> {
     let started = Instant::now();
-    let arm = config.stance.bind(&robot.arm(&config.arm)?)?;
-    let scene = scene.clone().in_the_way();
-    let here = scene.transformed(&config.stance.pose().inverse());
-    let (points, obstacles) = (here.points(), &here.obstacles);
-    let world = World::new(robot, &arm, &config.tool, points, obstacles, &config.collision)?;
-    if let Some(hit) = world.stance_hit() {
-        return Err(FollowError::StanceHit { hit: hit.to_string() });
-    }
-    if let Some(why) = config.start.and_then(|q| why_not_start(&arm, &world, &q)) {
-        return Err(FollowError::Start { why });
-    }
+    let setup = &config.setup;
+    let Standing { arm, scene, world } = setup.stand(robot, scene)?;
     let poses = segments.concat();
-    let cell = Workcell { arm: &arm, tool: &config.tool, world: &world };
+    let cell = Workcell { arm: &arm, tool: &setup.tool, world: &world };
     let places = places(segments);
     let problem = Problem {
-        space: Space::new(&arm, &world, &config.tool, &config.tolerance),
+        space: Space::new(&arm, &world, &setup.tool, &setup.tolerance),
         cell,
         segments: &places,
-        start: config.start,
+        start: setup.start,
         step: config.step,
-        seed: config.seed,
+        seed: setup.seed,
     };
     progress.stage("ladder", None);
     let found = search(&problem);
@@ -78,24 +68,16 @@ pub fn run(
     progress.stage("smoothing", None);
     let pieces = smoothed(&problem, &found);
     tell(&problem.space, &poses, &pieces, progress);
-    let given = poses::Given {
-        robot,
-        arm: &arm,
-        tool: &config.tool,
-        stance: &config.stance,
-        poses: &poses,
-        seed: config.seed,
-        velocity: config.speed.velocity(&arm),
-    };
+    let given = poses::Given { robot, arm: &arm, setup, poses: &poses };
     progress.stage("timing", None);
     let plan = poses::assemble(given, &pieces);
     let stops = ends(&plan);
-    let plan = config.speed.set(plan, cell, &stops);
+    let plan = setup.speed.set(plan, cell, &stops);
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));
     let started = Instant::now();
-    let given = Given { robot, arm: &config.arm, scene: &scene, collision: &config.collision };
+    let given = Given { robot, arm: &setup.arm, scene: &scene, collision: &setup.collision };
     let verification = verify(&plan, given, &|| progress.tick())?;
     let figures = FollowFigures {
         segments: segments.len(),

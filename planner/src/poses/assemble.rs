@@ -1,12 +1,12 @@
 //! A way through given poses as a plan.
 
 use nalgebra::{Isometry3, UnitVector3, Vector3};
-use nullsweep_robot::{Arm, JointVector, Robot, Tool};
+use nullsweep_robot::{Arm, JointVector, Robot};
 
+use super::setup::Setup;
 use super::space::Point;
 use crate::plan::{Plan, PlanKnot, SurfaceSample};
 use crate::timing;
-use crate::workcell::Stance;
 
 /// A place on the way.
 #[derive(Clone, Copy, Debug)]
@@ -32,13 +32,9 @@ pub(crate) enum Piece {
 pub(crate) struct Given<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) arm: &'a Arm,
-    pub(crate) tool: &'a Tool,
-    pub(crate) stance: &'a Stance,
+    pub(crate) setup: &'a Setup,
     /// All poses, those that are left out too.
     pub(crate) poses: &'a [Isometry3<f64>],
-    pub(crate) seed: u64,
-    /// Each joint's velocity. \[rad/s\] or \[m/s\]
-    pub(crate) velocity: JointVector,
 }
 
 /// The pieces, one after the other, none of them empty and none through free space at the end, as a
@@ -69,14 +65,15 @@ pub(crate) fn assemble(given: Given<'_>, pieces: &[Piece]) -> Plan {
             })),
         }
     }
-    timing::set_times(&mut knots, &given.velocity);
+    let Setup { tool, stance, speed, seed, .. } = given.setup;
+    timing::set_times(&mut knots, &speed.velocity(given.arm));
     Plan {
-        base: given.stance.base,
-        base_height: given.stance.height,
-        seed: given.seed,
+        base: stance.base,
+        base_height: stance.height,
+        seed: *seed,
         patches: given.poses.iter().map(|p| p.translation.vector.into()).collect(),
         surface: given.poses.iter().map(place).collect(),
-        ..Plan::of(given.robot, given.arm, given.tool, knots)
+        ..Plan::of(given.robot, given.arm, tool, knots)
     }
 }
 

@@ -4,7 +4,7 @@ use nullsweep_collision::{ToolContact, World};
 use nullsweep_robot::{Arm, JointVector};
 
 /// Why the arm cannot be at a joint vector: the joint beyond its limits, or what is too near to what.
-pub(crate) fn why_not_start(arm: &Arm, world: &World, q: &JointVector) -> Option<String> {
+pub(super) fn why_not_start(arm: &Arm, world: &World, q: &JointVector) -> Option<String> {
     let limits = arm.margined_limits().iter().zip(q.iter()).zip(arm.joint_names());
     let outside = limits.into_iter().find_map(|((&(low, high), q), name)| {
         let inside = (low..=high).contains(q);

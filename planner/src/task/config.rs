@@ -1,33 +1,14 @@
 //! What is to be planned through given poses.
 
-use nullsweep_collision::Options;
-use nullsweep_robot::{ArmSpec, JointVector, Tool};
+use crate::poses::Setup;
 
-use crate::poses::Tolerance;
-use crate::timing::Speed;
-use crate::workcell::Stance;
-
-/// What is to be planned.
+/// How an order of poses is looked for.
 #[derive(Clone, Debug)]
 pub struct TaskConfig {
-    /// Base and tip link of the arm.
-    pub arm: ArmSpec,
-    /// The tool; its contact frame is what meets the poses.
-    pub tool: Tool,
-    /// How near is met.
-    pub tolerance: Tolerance,
-    /// Where the robot stands in the scene, and its held joints.
-    pub stance: Stance,
-    /// Where the arm is; `None`: at the pose that comes first. \[rad\] or \[m\]
-    pub start: Option<JointVector>,
-    /// How fast the plan goes along its path, at rest in each pose.
-    pub speed: Speed,
-    /// Collision margins and meshes.
-    pub collision: Options,
+    /// How they are met; with limited acceleration the arm rests in each.
+    pub setup: Setup,
     /// Rounds of order and relaxation.
     pub rounds: usize,
     /// Trials of the order's search for each pose in each round.
     pub trials: u64,
-    /// Seed of every random choice.
-    pub seed: u64,
 }

@@ -1,32 +1,16 @@
 //! Why there is no plan through given poses.
 
-use nullsweep_collision::CollisionError;
 use nullsweep_gtsp::{InstanceError, SolveError};
-use nullsweep_robot::ArmError;
 
+use crate::poses::SetupError;
 use crate::verify::VerifyError;
 
 /// Why there is no plan.
 #[derive(Debug, thiserror::Error)]
 pub enum TaskError {
-    /// The arm cannot be used.
+    /// The robot cannot be set up there.
     #[error(transparent)]
-    Arm(#[from] ArmError),
-    /// Collisions cannot be checked.
-    #[error(transparent)]
-    Collision(#[from] CollisionError),
-    /// The body stands in something.
-    #[error("the robot cannot stand there: {hit}")]
-    StanceHit {
-        /// What is too near to what.
-        hit: String,
-    },
-    /// The arm cannot be where it is said to be.
-    #[error("the arm cannot start where it is: {why}")]
-    Start {
-        /// The joint beyond its limits, or what is too near to what.
-        why: String,
-    },
+    Setup(#[from] SetupError),
     /// No way leads from the start to any pose.
     #[error(
         "no motion through free space was found from the start to any of the {met} poses that the arm meets"

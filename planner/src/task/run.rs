@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use nalgebra::Isometry3;
-use nullsweep_collision::World;
 use nullsweep_robot::{JointVector, Robot};
 use rayon::prelude::*;
 
@@ -15,7 +14,7 @@ use super::search::search;
 use crate::cost::{self, Effort};
 use crate::plan::Plan;
 use crate::poses::{
-    self, Along, Chain, Order, Piece, Point, Space, Stop, chain, tell_unmet, why_not_start,
+    self, Along, Chain, Order, Piece, Point, Space, Standing, Stop, chain, tell_unmet,
 };
 use crate::progress::{Progress, left_out};
 use crate::verify::{Given, Verification, verify};
@@ -45,42 +44,25 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<TaskOutcome, TaskError> {
     let started = Instant::now();
-    let arm = config.stance.bind(&robot.arm(&config.arm)?)?;
-    let scene = scene.clone().in_the_way();
-    let here = scene.transformed(&config.stance.pose().inverse());
-    let (points, obstacles) = (here.points(), &here.obstacles);
-    let world = World::new(robot, &arm, &config.tool, points, obstacles, &config.collision)?;
-    if let Some(hit) = world.stance_hit() {
-        return Err(TaskError::StanceHit { hit: hit.to_string() });
-    }
-    if let Some(why) = config.start.and_then(|q| why_not_start(&arm, &world, &q)) {
-        return Err(TaskError::Start { why });
-    }
-    let space = Space::new(&arm, &world, &config.tool, &config.tolerance);
+    let setup = &config.setup;
+    let Standing { arm, scene, world } = setup.stand(robot, scene)?;
+    let space = Space::new(&arm, &world, &setup.tool, &setup.tolerance);
     let (route, unmet) = search(space, poses, config, progress)?;
     tell_unmet(&unmet, progress);
-    let cell = Workcell { arm: &arm, tool: &config.tool, world: &world };
+    let cell = Workcell { arm: &arm, tool: &setup.tool, world: &world };
     let pieces = connect(&space, cell, &route, config, progress)
         .ok_or(TaskError::NoWay { met: poses.len() - unmet.len() })?;
-    let given = poses::Given {
-        robot,
-        arm: &arm,
-        tool: &config.tool,
-        stance: &config.stance,
-        poses,
-        seed: config.seed,
-        velocity: config.speed.velocity(&arm),
-    };
+    let given = poses::Given { robot, arm: &arm, setup, poses };
     let plan = poses::assemble(given, &pieces);
     progress.stage("timing", None);
     let at_rest: Vec<usize> =
         (0..plan.knots.len()).filter(|&k| plan.knots[k].patch.is_some()).collect();
-    let plan = config.speed.set(plan, cell, &at_rest);
+    let plan = setup.speed.set(plan, cell, &at_rest);
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));
     let started = Instant::now();
-    let given = Given { robot, arm: &config.arm, scene: &scene, collision: &config.collision };
+    let given = Given { robot, arm: &setup.arm, scene: &scene, collision: &setup.collision };
     let verification = verify(&plan, given, &|| progress.tick())?;
     let joints: Vec<JointVector> = plan.knots.iter().map(|k| k.q).collect();
     let along = Along::of(&space, poses, &pieces);
@@ -88,7 +70,7 @@ pub fn run(
         poses: poses.len(),
         met: along.met,
         movement_rad: along.movement,
-        reconfigurations: along.ways.saturating_sub(usize::from(config.start.is_some())),
+        reconfigurations: along.ways.saturating_sub(usize::from(setup.start.is_some())),
         effort_rad: cost::of_path(&Effort, &joints),
         task_time_s: plan.duration(),
         excess_max: along.excess,
@@ -114,7 +96,7 @@ fn connect(
 ) -> Option<Vec<Piece>> {
     progress.stage("ways", None);
     let runs = runs(space, route);
-    let (start, seed) = (config.start.as_ref(), config.seed);
+    let (start, seed) = (config.setup.start.as_ref(), config.setup.seed);
     let mut order: Vec<usize> = (0..runs.len()).collect();
     let mut best = chain(cell, &runs, start, Order::Free, seed);
     let count = |runs: &[usize], of: &[Vec<Stop>]| -> usize {

@@ -60,7 +60,7 @@ pub(super) fn search(
 ) -> Result<(Route, Vec<(usize, Unmet)>), TaskError> {
     let task = Task { space, poses, near: neighbours(poses) };
     progress.stage("charts", None);
-    let roots = roots(&task, config.seed);
+    let roots = roots(&task, config.setup.seed);
     let mut charts: Vec<(usize, f64, Chart)> = roots
         .par_iter()
         .map(|&(pose, root)| {
@@ -82,7 +82,7 @@ pub(super) fn search(
     progress.stage("order", Some(config.rounds));
     let mut best: Option<(f64, Route)> = None;
     for round in 0..config.rounds {
-        let seed = config.seed.wrapping_add(round as u64);
+        let seed = config.setup.seed.wrapping_add(round as u64);
         let mut route = order(&task, &choices, config.trials, seed)?;
         settle(&task, &mut route);
         let cost = task.cost(&route);
