@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use nullsweep_ipc_types::PlanEvent;
 use nullsweep_planner::link::publish::{self as link, Join, Patience, Watcher, describe_for};
+use nullsweep_planner::plan::Held;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -16,13 +17,14 @@ use crate::plan::Plan;
 struct Told {
     event: Option<Py<PyAny>>,
     joints: Vec<String>,
+    held: Vec<Held>,
     failed: Option<PyErr>,
 }
 
 impl Watcher for Told {
     fn event(&mut self, event: &PlanEvent) {
         let (Some(callback), None) = (&self.event, &self.failed) else { return };
-        let text = describe_for(event, &self.joints);
+        let text = describe_for(event, &self.joints, &self.held);
         let called = Python::attach(|py| callback.call1(py, (text,)).map(|_| ()));
         self.failed = called.err();
     }
@@ -62,7 +64,8 @@ pub(crate) fn publish(
     let default = Cell::default_one();
     let cell = cell.unwrap_or(&default);
     let (robot, root) = (cell.robot_name(), cell.root());
-    let mut told = Told { event, joints: plan.joints.clone(), failed: None };
+    let (joints, held) = (plan.joints.clone(), plan.held.clone());
+    let mut told = Told { event, joints, held, failed: None };
     let patience = Patience { admission, end };
     let sent = py.detach(|| link::publish(plan, robot, root, join, patience, &mut told));
     let id = sent.map_err(raise)?;

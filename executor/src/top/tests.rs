@@ -189,6 +189,14 @@ fn keys_ask_for_commands() {
     assert_eq!((press('q'), press('z')), (Some(Deed::Quit), None));
     let control = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
     assert_eq!(deed(control), Some(Deed::Quit));
+    // What is meant for the terminal moves no arm; a stop is a stop.
+    for modifiers in [KeyModifiers::CONTROL, KeyModifiers::ALT] {
+        for key in ['p', 'r', 'd', 'x', '+', '-', 'q'] {
+            assert_eq!(deed(KeyEvent::new(KeyCode::Char(key), modifiers)), None, "{key}");
+        }
+        let stop = deed(KeyEvent::new(KeyCode::Char('s'), modifiers));
+        assert_eq!(stop, Some(Deed::Command(CommandKind::Stop)));
+    }
     // Steps of a tenth from what was asked for last, within 0 and 1.
     assert_eq!((press('+'), press('-')), (Some(Deed::Speed(0.1)), Some(Deed::Speed(-0.1))));
     assert_eq!((faster(1.0, 0.1), faster(0.05, -0.1), faster(f64::NAN, 0.1)), (1.0, 0.0, 0.0));

@@ -64,7 +64,7 @@ fn rows(f: &FollowFigures) -> Vec<[String; 2]> {
         ["reconfigurations".to_owned(), f.reconfigurations.to_string()],
         ["ways through free space".to_owned(), f.transfers.to_string()],
         ["joint movement (L2)".to_owned(), format!("{:.2} rad", f.movement_rad)],
-        ["  least of the samples".to_owned(), sampled],
+        ["  samples' least, before smoothing".to_owned(), sampled],
         ["effort, transfers included".to_owned(), format!("{:.2} rad", f.effort_rad)],
         ["task time".to_owned(), format!("{:.2} s", f.task_time_s)],
         ["beyond the tolerance, max".to_owned(), error],
