@@ -13,21 +13,11 @@ use nullsweep_planner::poses::{self, QuaternionOrder, ReadOptions, Setup, SetupE
 use nullsweep_planner::progress::{Progress, Silent};
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
-use nullsweep_planner::workcell::{Scene, Stance};
-use nullsweep_robot::{Arm, ArmSpec, Geometry, Robot, Side, Tool};
+use nullsweep_planner::workcell::Scene;
+use nullsweep_robot::{Arm, ArmSpec, Geometry, Robot, Side};
 
 fn config() -> FollowConfig {
-    let setup = Setup {
-        arm: ArmSpec::pr2(Side::Right),
-        // Poses of the gripper's tool frame, its x axis ahead.
-        tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
-        tolerance: Tolerance([0.0; 6]),
-        stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
-        start: None,
-        speed: Speed::default(),
-        collision: Options::default(),
-        seed: 1,
-    };
+    let setup = common::setup(Tolerance([0.0; 6]));
     FollowConfig { setup, step: FollowConfig::STEP }
 }
 

@@ -10,11 +10,10 @@ use std::path::Path;
 use nullsweep_collision::Options;
 use nullsweep_planner::pipeline::{End, Job, StanceChoice, run};
 use nullsweep_planner::plan::{CostKind, Method, Profile};
-use nullsweep_planner::poses::{self, Setup, Tolerance};
+use nullsweep_planner::poses::Tolerance;
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::task::{self, TaskConfig};
-use nullsweep_planner::timing::Speed;
 use nullsweep_planner::workcell::Scene;
 use nullsweep_planner::workcell::stance::Stance;
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
@@ -183,16 +182,7 @@ fn given_poses_are_planned_as_ever() {
     if !comparable() {
         return;
     }
-    let setup = Setup {
-        arm: ArmSpec::pr2(Side::Right),
-        tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
-        tolerance: Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]),
-        stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
-        start: None,
-        speed: Speed::default(),
-        collision: Options::default(),
-        seed: 1,
-    };
+    let setup = common::setup(Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]));
     let config = TaskConfig { setup, rounds: 2, trials: 10 };
     let outcome = task::run(
         &Robot::pr2(),

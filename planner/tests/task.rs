@@ -14,21 +14,10 @@ use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome};
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
 use nullsweep_planner::workcell::{Scene, Stance};
-use nullsweep_robot::{ArmSpec, Geometry, Robot, Side, Tool};
+use nullsweep_robot::{ArmSpec, Geometry, Robot, Side};
 
 fn config(tolerance: Tolerance) -> TaskConfig {
-    let setup = Setup {
-        arm: ArmSpec::pr2(Side::Right),
-        // Poses of the gripper's tool frame, its x axis ahead.
-        tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
-        tolerance,
-        stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
-        start: None,
-        speed: Speed::default(),
-        collision: Options::default(),
-        seed: 1,
-    };
-    TaskConfig { setup, rounds: 2, trials: 10 }
+    TaskConfig { setup: common::setup(tolerance), rounds: 2, trials: 10 }
 }
 
 /// Another one, met as is given.

@@ -2,7 +2,11 @@
 #![allow(dead_code, reason = "each test compiles this by itself")]
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use nullsweep_planner::workcell::Scene;
+use nullsweep_collision::Options;
+use nullsweep_planner::poses::{self, Setup, Tolerance};
+use nullsweep_planner::timing::Speed;
+use nullsweep_planner::workcell::{Scene, Stance};
+use nullsweep_robot::{ArmSpec, Side, Tool};
 use nullsweep_surface::{CleanConfig, Placement, place, simulate};
 
 /// The seat of the simulated chair, the rest of it in the way.
@@ -27,4 +31,18 @@ pub(crate) fn dome() -> Vec<Isometry3<f64>> {
         }
     }
     poses
+}
+
+/// Poses of the gripper's tool frame, its x axis ahead, met by the PR2's right arm.
+pub(crate) fn setup(tolerance: Tolerance) -> Setup {
+    Setup {
+        arm: ArmSpec::pr2(Side::Right),
+        tool: Tool { approach: [1.0, 0.0, 0.0], ..poses::tip_tool() },
+        tolerance,
+        stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
+        start: None,
+        speed: Speed::default(),
+        collision: Options::default(),
+        seed: 1,
+    }
 }
