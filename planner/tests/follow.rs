@@ -3,14 +3,13 @@
 mod common;
 
 use std::path::Path;
-use std::sync::Mutex;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options, ToolContact, World};
 use nullsweep_planner::follow::{self, FollowConfig, FollowError, FollowOutcome};
 use nullsweep_planner::plan::{Plan, Profile};
 use nullsweep_planner::poses::{self, QuaternionOrder, ReadOptions, Setup, SetupError, Tolerance};
-use nullsweep_planner::progress::{Progress, Silent};
+use nullsweep_planner::progress::Silent;
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
 use nullsweep_planner::workcell::Scene;
@@ -207,18 +206,6 @@ fn is_met(pose: &Isometry3<f64>, world: &World) -> bool {
     })
 }
 
-/// Keeps what is told.
-#[derive(Default)]
-struct Notes(Mutex<Vec<String>>);
-
-impl Progress for Notes {
-    fn stage(&self, _: &'static str, _: Option<usize>) {}
-    fn tick(&self) {}
-    fn note(&self, text: &str) {
-        self.0.lock().unwrap().push(text.into());
-    }
-}
-
 #[test]
 fn what_cannot_be_met_is_left_out_and_told_and_the_rest_is_followed() {
     // The row goes through a post, another one is out of reach.
@@ -226,7 +213,7 @@ fn what_cannot_be_met_is_left_out_and_told_and_the_rest_is_followed() {
     segments.push(vec![down(3.0, 0.0), down(3.0, 0.1)]);
     let at = segments[0][6].translation.vector;
     let scene = Scene::of_obstacles(vec![cuboid(at - Vector3::z() * 0.03, 0.025)]);
-    let notes = Notes::default();
+    let notes = common::Notes::default();
     let outcome = follow::run(&Robot::pr2(), &segments, &scene, &config(), &notes).unwrap();
     assert_eq!(outcome.verification.violations, []);
     let notes = notes.0.into_inner().unwrap();

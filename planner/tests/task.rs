@@ -3,13 +3,12 @@
 mod common;
 
 use std::path::Path;
-use std::sync::Mutex;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use nullsweep_collision::{Obstacle, ObstacleShape, Options};
 use nullsweep_planner::plan::Profile;
 use nullsweep_planner::poses::{self, ReadOptions, Setup, SetupError, Tolerance};
-use nullsweep_planner::progress::{Progress, Silent};
+use nullsweep_planner::progress::Silent;
 use nullsweep_planner::task::{self, TaskConfig, TaskError, TaskOutcome};
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::verify::{Given, verify};
@@ -139,7 +138,7 @@ fn a_pose_is_left_out_for_what_is_in_the_way() {
         carries_robot: false,
     };
     let scene = Scene { obstacles: vec![post], ..nothing() };
-    let notes = Notes::default();
+    let notes = common::Notes::default();
     let config = config(Tolerance::AXIS);
     let outcome = task::run(&Robot::pr2(), &dome, &scene, &config, &notes).unwrap();
     assert_eq!(outcome.verification.violations, []);
@@ -147,18 +146,6 @@ fn a_pose_is_left_out_for_what_is_in_the_way() {
     assert!(notes.iter().any(|n| n.contains("left out") && n.contains("post")), "{notes:?}");
     assert!(!notes.iter().any(|n| n.contains("inside the arm's limits")), "{notes:?}");
     assert!((15..25).contains(&outcome.figures.met), "{:?}", outcome.figures);
-}
-
-/// Keeps what is told.
-#[derive(Default)]
-struct Notes(Mutex<Vec<String>>);
-
-impl Progress for Notes {
-    fn stage(&self, _: &'static str, _: Option<usize>) {}
-    fn tick(&self) {}
-    fn note(&self, text: &str) {
-        self.0.lock().unwrap().push(text.into());
-    }
 }
 
 /// What the check of a plan says of it in a scene.

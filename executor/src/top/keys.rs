@@ -27,12 +27,11 @@ pub(super) fn faster(scale: f64, by: f64) -> f64 {
 /// What a key means, if anything.
 pub(super) fn deed(key: KeyEvent) -> Option<Deed> {
     let control = key.modifiers.contains(KeyModifiers::CONTROL);
-    let plain = KeyModifiers::NONE | KeyModifiers::SHIFT;
     Some(match key.code {
         KeyCode::Char('c') if control => Deed::Quit,
         KeyCode::Char('s' | ' ') => Deed::Command(CommandKind::Stop),
         // A hand that means the terminal (Ctrl-R, Ctrl-D) must not move an arm: it can only stop it.
-        _ if !plain.contains(key.modifiers) => return None,
+        _ if !KeyModifiers::SHIFT.contains(key.modifiers) => return None,
         KeyCode::Char('q') | KeyCode::Esc => Deed::Quit,
         KeyCode::Char('p') => Deed::Command(CommandKind::Pause),
         KeyCode::Char('r') => Deed::Command(CommandKind::Resume),

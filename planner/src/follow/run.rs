@@ -174,8 +174,8 @@ fn tell(space: &Space<'_>, poses: &[Isometry3<f64>], pieces: &[Piece], progress:
         progress.note(&left_out(
             ["pose", "poses"],
             &apart,
-            "the arm meets it, but the path cannot be followed there, and no motion through free space \
-             leads there",
+            "the arm meets it, but no way was found to follow the path there, nor a motion through free \
+             space to there",
         ));
     }
 }

@@ -124,7 +124,7 @@ fn connect(
         progress.note(&left_out(
             ["pose", "poses"],
             &left,
-            "no motion through free space leads there from the other poses, or the tool does not come \
+            "no motion through free space was found to there from the other poses, or the tool does not come \
              off there",
         ));
     }

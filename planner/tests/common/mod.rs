@@ -1,9 +1,12 @@
 //! What several tests plan for. Each of them uses a part.
 #![allow(dead_code, reason = "each test compiles this by itself")]
 
+use std::sync::Mutex;
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use nullsweep_collision::Options;
 use nullsweep_planner::poses::{self, Setup, Tolerance};
+use nullsweep_planner::progress::Progress;
 use nullsweep_planner::timing::Speed;
 use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::{ArmSpec, Side, Tool};
@@ -44,5 +47,17 @@ pub(crate) fn setup(tolerance: Tolerance) -> Setup {
         speed: Speed::default(),
         collision: Options::default(),
         seed: 1,
+    }
+}
+
+/// Keeps what is told.
+#[derive(Default)]
+pub(crate) struct Notes(pub(crate) Mutex<Vec<String>>);
+
+impl Progress for Notes {
+    fn stage(&self, _: &'static str, _: Option<usize>) {}
+    fn tick(&self) {}
+    fn note(&self, text: &str) {
+        self.0.lock().unwrap().push(text.into());
     }
 }
