@@ -7,6 +7,7 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyList;
 
 use crate::errors::shape;
 
@@ -52,6 +53,20 @@ pub(crate) fn poses(value: &Bound<'_, PyAny>) -> PyResult<Rows<Isometry3<f64>>> 
     let rows = numbers.chunks_exact(size).enumerate();
     let rows = rows.map(|(i, row)| if size == 7 { seven(i, row) } else { matrix(i, row) });
     Ok(Rows { rows: rows.collect::<PyResult<_>>()?, is_one })
+}
+
+/// Segments of poses: poses as [`poses`] takes them are one, a list of (n, 7) or (n, 4, 4) is several.
+pub(crate) fn segments(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<Isometry3<f64>>>> {
+    let is_segment = |item: &Bound<'_, PyAny>| {
+        let shape = numbers(item).map(|array| array.shape().to_vec());
+        matches!(shape.as_deref(), Ok([_, 7] | [_, 4, 4]))
+    };
+    match value.cast::<PyList>() {
+        Ok(list) if list.get_item(0).is_ok_and(|item| is_segment(&item)) => {
+            list.iter().map(|segment| Ok(poses(&segment)?.rows)).collect()
+        }
+        _ => Ok(vec![poses(value)?.rows]),
+    }
 }
 
 fn seven(i: usize, row: &[f64]) -> PyResult<Isometry3<f64>> {

@@ -38,6 +38,7 @@ fn _nullsweep(py: Python<'_>, module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<executor::Status>()?;
     module.add_function(wrap_pyfunction!(planning::plan, module)?)?;
     module.add_function(wrap_pyfunction!(planning::task, module)?)?;
+    module.add_function(wrap_pyfunction!(planning::follow, module)?)?;
     module.add_function(wrap_pyfunction!(publish::publish, module)?)?;
     module.add_function(wrap_pyfunction!(gtsp::solve, module)?)?;
     module.add_function(wrap_pyfunction!(gtsp::read, module)?)?;

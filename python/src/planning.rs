@@ -1,5 +1,7 @@
 //! Making plans.
 
+use std::ffi::OsString;
+
 use nullsweep_cli::calls;
 use nullsweep_planner::pipeline::After;
 use pyo3::exceptions::PyTypeError;
@@ -37,6 +39,23 @@ pub(crate) fn plan(
     make(py, progress, |told| calls::plan(&words, after, told))
 }
 
+/// Makes a verified plan along a given path of the tool in the robot's root frame: poses in their order,
+/// or several such segments. Keywords beside these are `planner follow`'s flags.
+#[pyfunction]
+#[pyo3(signature = (path, cell=None, *, scan=None, progress=None, **settings))]
+pub(crate) fn follow(
+    py: Python<'_>,
+    path: &Bound<'_, PyAny>,
+    cell: Option<&Cell>,
+    scan: Option<&Scan>,
+    progress: Option<Py<PyAny>>,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Py<Plan>> {
+    let segments = arrays::segments(path)?;
+    let words = around(cell, scan, settings)?;
+    make(py, progress, |told| calls::follow(&words, segments, told))
+}
+
 /// Makes a verified plan through given poses of the tool in the robot's root frame. Keywords beside
 /// these are `planner task`'s flags.
 #[pyfunction]
@@ -50,10 +69,17 @@ pub(crate) fn task(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<Plan>> {
     let poses = arrays::poses(poses)?.rows;
-    let cell = cell.map_or_else(|| Cell::default_one().of_plan(), Cell::of_plan);
-    let mut words = [cell, words::of(settings)?].concat();
-    if let Some(scan) = scan {
-        words.extend(scan.around()?);
-    }
+    let words = around(cell, scan, settings)?;
     make(py, progress, |told| calls::task(&words, poses, told))
+}
+
+/// The words of a command that goes through given poses.
+fn around(
+    cell: Option<&Cell>,
+    scan: Option<&Scan>,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Vec<OsString>> {
+    let cell = cell.map_or_else(|| Cell::default_one().of_plan(), Cell::of_plan);
+    let scan = scan.map_or(Ok(Vec::new()), Scan::around)?;
+    Ok([cell, words::of(settings)?, scan].concat())
 }

@@ -201,6 +201,24 @@ def test_a_notebook_shows_it(plan, tmp_path):
     assert shown.count('"') == 6
 
 
+def test_a_path_is_followed(cell, planner, tmp_path):
+    rows = np.loadtxt(SAMPLE / "paths/rows.csv", delimiter=",", comments="#", skiprows=2)
+    first, second = [rows[rows[:, 0] == segment, 1:] for segment in np.unique(rows[:, 0])[:2]]
+    given = tmp_path / "given.csv"
+    lines = [[s, *pose] for s, poses in enumerate([first, second]) for pose in poses]
+    head = "segment,x,y,z,qx,qy,qz,qw"
+    given.write_text("\n".join([head, *(",".join(map(repr, map(float, line))) for line in lines)]))
+    plan = nullsweep.follow([first, second], cell)
+    said, code = planner("follow", given, "--out", tmp_path / "plan.json")
+    assert code == 0, said
+    plan.write(tmp_path / "ours.json")
+    assert (tmp_path / "ours.json").read_bytes() == (tmp_path / "plan.json").read_bytes()
+    assert (plan.figures["segments"], plan.figures["met"]) == (2, len(lines))
+    assert nullsweep.follow(np.concatenate([first, second]), cell).figures["segments"] == 1
+    with pytest.raises(ValueError, match=r"poses\[0\]"):
+        nullsweep.follow([[0, 0, 1, 0, 0, 0, 0]], cell)
+
+
 def test_poses_are_met(cell, planner, tmp_path):
     table = np.loadtxt(SAMPLE / "poses.csv", delimiter=",", comments="#", skiprows=2)
     plan = nullsweep.task(table[:, 1:], cell)

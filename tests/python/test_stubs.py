@@ -44,11 +44,12 @@ def keywords(name):
 
 def test_every_setting_is_a_flag_and_every_flag_a_setting(planner):
     scan = {"up", "sensor_height", "sensor_pose", "support_height", "scale", "as_placed", "table",
-            "unseen", "crop", "object", "demo"}
+            "unseen", "crop", "object", "obstacles", "demo"}
     cell = {"urdf", "arm", "package", "fit_capsules", "srdf", "posture", "tool", "torso", "held",
             "robot_name", "ipc_root", "cell"}
-    shell = {"out", "json", "report", "help", "continue", "again", "scene"}
-    for command in ("plan", "task"):
+    shell = {"out", "json", "report", "help", "continue", "again", "scene",
+             "quat", "offset"}
+    for command in ("plan", "task", "follow"):
         own = keywords(command) - {"progress", "after", "again", "scan"}
         assert own <= flags(planner, command)
         # What the help of a flag names is a flag too: none is missed.
@@ -57,7 +58,7 @@ def test_every_setting_is_a_flag_and_every_flag_a_setting(planner):
 
 
 def test_everything_says_what_it_is():
-    for name in ("plan", "task", "publish", "solve", "read"):
+    for name in ("plan", "task", "follow", "publish", "solve", "read"):
         assert inspect.getdoc(getattr(built, name)), name
     for name in ("Cell", "Arm", "Scan", "Scene", "Plan", "Executor", "Solutions"):
         assert inspect.getdoc(getattr(built, name)), name

@@ -18,6 +18,7 @@ use serde::Serialize;
 
 use crate::bars::Bars;
 use crate::exit::Usage;
+use crate::follow::PathArgs;
 use crate::numbers::{self, Held, finite};
 use crate::plan::PlanCommandArgs;
 use crate::robot::{RobotArgs, tool_file};
@@ -99,6 +100,23 @@ pub fn plan(
     Planned::new(&outcome.plan, found, &outcome.figures, Box::new(move || page.page()))
 }
 
+/// `planner follow` along segments of poses of the tool in the robot's root frame.
+///
+/// # Errors
+/// As the command's.
+pub fn follow(
+    words: &[OsString],
+    segments: Vec<Vec<Isometry3<f64>>>,
+    listener: Listener,
+) -> anyhow::Result<Planned> {
+    let args: FollowArgs = parse(words)?;
+    let poses = Poses { segments, notes: Vec::new() };
+    let made = Arc::new(args.follow.work(poses, args.site.site(), &Bars::of(listener))?);
+    let (outcome, page) = (&made.outcome, Arc::clone(&made));
+    let found = &outcome.verification;
+    Planned::new(&outcome.plan, found, &outcome.figures, Box::new(move || page.drawn().page()))
+}
+
 /// `planner task` through poses of the tool in the robot's root frame.
 ///
 /// # Errors
@@ -135,6 +153,14 @@ pub fn scene(words: &[OsString], listener: Listener) -> anyhow::Result<Scene> {
     let args: PlanCommandArgs = parse(words)?;
     let bars = Bars::of(listener);
     args.plan.scene(&bars)
+}
+
+#[derive(Debug, Args)]
+struct FollowArgs {
+    #[command(flatten)]
+    follow: PathArgs,
+    #[command(flatten)]
+    site: SiteArgs,
 }
 
 #[derive(Debug, Args)]

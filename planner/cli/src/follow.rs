@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use nullsweep_planner::follow::{self, FollowConfig, FollowFigures};
+use nullsweep_planner::follow::{self, FollowConfig, FollowFigures, FollowOutcome};
+use nullsweep_planner::link::Site;
+use nullsweep_planner::poses::Poses;
 use nullsweep_planner::progress::Progress;
 
 use crate::bars::Bars;
 use crate::figures::{held_against, violations};
-use crate::given::{Drawn, GivenArgs, OutArgs, ReadArgs};
+use crate::given::{Drawn, GivenArgs, OutArgs, ReadArgs, Setting};
 use crate::numbers::Numbers;
 use crate::site::SiteArgs;
 
@@ -20,31 +22,57 @@ pub(super) struct FollowArgs {
     #[command(flatten)]
     read: ReadArgs,
     #[command(flatten)]
-    given: GivenArgs,
-    /// The most that a turning joint, and a sliding one, may move while the tool goes 1 cm or turns 3°:
-    /// what moves more has changed its posture. [rad], [m]
-    #[arg(long, value_name = "RAD,M", default_value = "0.12,0.02")]
-    step: Numbers<2>,
+    follow: PathArgs,
     #[command(flatten)]
     out: OutArgs,
     #[command(flatten)]
     site: SiteArgs,
 }
 
+/// How a path is followed.
+#[derive(Debug, Args)]
+pub(super) struct PathArgs {
+    #[command(flatten)]
+    given: GivenArgs,
+    /// The most that a turning joint, and a sliding one, may move while the tool goes 1 cm or turns 3°:
+    /// what moves more has changed its posture. [rad], [m]
+    #[arg(long, value_name = "RAD,M", default_value = "0.12,0.02")]
+    step: Numbers<2>,
+}
+
 pub(super) fn run(args: &FollowArgs) -> anyhow::Result<u8> {
     args.out.writable()?;
     let bars = Bars::new();
-    let setting = args.given.setting(args.read.read(&args.path)?, args.site.site(), &bars)?;
-    let config = FollowConfig { setup: setting.setup.clone(), step: args.step.0 };
-    let outcome = follow::run(&setting.robot, &setting.segments, &setting.scene, &config, &bars);
-    bars.clear();
-    let outcome = outcome?;
-    for note in &outcome.figures.notes {
-        bars.note(note);
+    let made = args.follow.work(args.read.read(&args.path)?, args.site.site(), &bars)?;
+    args.out.finish(&made.drawn(), &made.outcome.figures)
+}
+
+/// What was made, and of what.
+pub(super) struct Made {
+    setting: Setting,
+    pub(super) outcome: FollowOutcome,
+}
+
+impl Made {
+    pub(super) fn drawn(&self) -> Drawn<'_> {
+        let FollowOutcome { plan, verification, figures, .. } = &self.outcome;
+        Drawn { setting: &self.setting, plan, verification, rows: rows(figures) }
     }
-    let (plan, verification) = (&outcome.plan, &outcome.verification);
-    let made = Drawn { setting: &setting, plan, verification, rows: rows(&outcome.figures) };
-    args.out.finish(&made, &outcome.figures)
+}
+
+impl PathArgs {
+    /// Makes the plan along some path.
+    pub(super) fn work(&self, poses: Poses, site: Site<'_>, bars: &Bars) -> anyhow::Result<Made> {
+        let setting = self.given.setting(poses, site, bars)?;
+        let config = FollowConfig { setup: setting.setup.clone(), step: self.step.0 };
+        let outcome = follow::run(&setting.robot, &setting.segments, &setting.scene, &config, bars);
+        bars.clear();
+        let outcome = outcome?;
+        for note in &outcome.figures.notes {
+            bars.note(note);
+        }
+        Ok(Made { setting, outcome })
+    }
 }
 
 /// The figures as name and value, for people.

@@ -16,6 +16,7 @@ from ._nullsweep import (
     Telemetry,
     UsageError,
     __version__,
+    follow,
     plan,
     publish,
     task,
@@ -23,5 +24,6 @@ from ._nullsweep import (
 
 __all__ = [
     "Arm", "BrokenPlanError", "Cell", "Error", "Executor", "LostError", "Plan", "Scan", "Scene",
-    "Solutions", "Status", "Telemetry", "UsageError", "__version__", "gtsp", "plan", "publish", "task",
+    "Solutions", "Status", "Telemetry", "UsageError", "__version__", "follow", "gtsp", "plan", "publish",
+    "task",
 ]

@@ -99,15 +99,16 @@ class Scan:
         scale: Optional[float] = None,
         as_placed: bool = False,
         table: Optional[Sequence[float]] = None,
-        unseen: Optional[Literal["avoid", "free"]] = None,
+        unseen: Optional[Literal["avoid", "forbid", "free"]] = None,
         crop: Optional[Sequence[float]] = None,
         object: Union[None, int, str, Sequence[float]] = None,
+        obstacles: Optional[Path] = None,
     ) -> None: ...
     @staticmethod
     def demo(
         name: Literal["chair", "chair-seat", "bobby-car"],
         *,
-        unseen: Optional[Literal["avoid", "free"]] = None,
+        unseen: Optional[Literal["avoid", "forbid", "free"]] = None,
     ) -> Scan: ...
     def scene(self, cell: Optional[Cell] = None, *, seed: int = 1) -> Scene: ...
 
@@ -210,15 +211,38 @@ def task(
     scan: Optional[Scan] = None,
     progress: Optional[Progress] = None,
     tolerance: Union[str, Sequence[Union[float, str]], None] = None,
+    stand_off: Optional[float] = None,
     floor: Optional[float] = None,
     base: Optional[Sequence[float]] = None,
     torso: Optional[float] = None,
     held: Optional[Mapping[str, float]] = None,
     start: Optional[Posture] = None,
     profile: Optional[Profile] = None,
+    jerk: Optional[str] = None,
+    tool_speed: Optional[float] = None,
     v_max: Optional[float] = None,
     rounds: Optional[int] = None,
     trials: Optional[int] = None,
+    seed: Optional[int] = None,
+) -> Plan: ...
+def follow(
+    path: Union[ArrayLike, Sequence[ArrayLike]],
+    cell: Optional[Cell] = None,
+    *,
+    scan: Optional[Scan] = None,
+    progress: Optional[Progress] = None,
+    tolerance: Union[str, Sequence[Union[float, str]], None] = None,
+    stand_off: Optional[float] = None,
+    floor: Optional[float] = None,
+    base: Optional[Sequence[float]] = None,
+    torso: Optional[float] = None,
+    held: Optional[Mapping[str, float]] = None,
+    start: Optional[Posture] = None,
+    profile: Optional[Profile] = None,
+    jerk: Optional[str] = None,
+    tool_speed: Optional[float] = None,
+    v_max: Optional[float] = None,
+    step: Optional[Sequence[float]] = None,
     seed: Optional[int] = None,
 ) -> Plan: ...
 def publish(
