@@ -222,13 +222,14 @@ impl Crossover {
             let mut best = (i64::MAX, [NONE; 4]);
             for &x in &clusters {
                 for (n, _) in table.near_out(x) {
-                    self.try_patch(table, a, &d, (id, x, n), &mut best);
+                    self.try_patch(table, &d, (id, x, n), &mut best);
                 }
             }
             if best.0 == i64::MAX {
-                for &x in &clusters {
-                    for n in 0..table.m as u32 {
-                        self.try_patch(table, a, &d, (id, x, n), &mut best);
+                // Nothing near is outside: where arcs were exchanged, of which each subtour has some.
+                for &x in self.touched.iter().filter(|&&x| self.pieces.part_of(x) == id) {
+                    for &u in &self.touched {
+                        self.try_patch(table, &d, (id, x, u), &mut best);
                     }
                 }
             }
@@ -236,7 +237,7 @@ impl Crossover {
             let [x, y, u, v] = best.1;
             replace_arc(&mut self.child, table.reversible, x, y, u, v);
             self.touched.extend_from_slice(&best.1);
-            self.pieces.join(id, self.pieces.part_of(a, u));
+            self.pieces.join(id, &clusters, self.pieces.part_of(u));
             self.pieces.cut(a, &self.child, &best.1);
         }
     }
@@ -245,29 +246,35 @@ impl Crossover {
     fn try_patch(
         &self,
         table: &Table,
-        a: &SearchTour,
         d: &impl Fn(u32, u32) -> i64,
         (id, x, u): (u32, u32, u32),
         best: &mut (i64, [u32; 4]),
     ) {
-        if self.pieces.part_of(a, u) == id {
+        if self.pieces.part_of(u) == id {
             return;
         }
+        let joined = d(x, u);
+        // The other new arc is the dear one to look up: it costs `least` at least.
+        let least = i64::from(table.least);
+        let mut attempt = |y: u32, v: u32, removed: i64, other: (u32, u32)| {
+            let rest = joined - removed;
+            if rest.saturating_add(least) < best.0 {
+                let delta = rest + d(other.0, other.1);
+                if delta < best.0 {
+                    *best = (delta, [x, y, u, v]);
+                }
+            }
+        };
         if table.reversible {
             for y in self.child[x as usize] {
+                let before = d(x, y);
                 for v in self.child[u as usize] {
-                    let delta = d(x, u) + d(y, v) - d(x, y) - d(u, v);
-                    if delta < best.0 {
-                        *best = (delta, [x, y, u, v]);
-                    }
+                    attempt(y, v, before + d(u, v), (y, v));
                 }
             }
         } else {
             let (y, v) = (self.child[x as usize][1], self.child[u as usize][0]);
-            let delta = d(x, u) + d(v, y) - d(x, y) - d(v, u);
-            if delta < best.0 {
-                *best = (delta, [x, y, u, v]);
-            }
+            attempt(y, v, d(x, y) + d(v, u), (v, y));
         }
     }
 

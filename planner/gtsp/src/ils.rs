@@ -18,10 +18,14 @@ pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> SearchTour {
     let mut chosen = vec![0; m];
     let mut visited = vec![false; m];
     let mut order = Vec::with_capacity(m);
+    // Clusters on the way that may have others near them which are not visited yet, and the first that
+    // may not be visited.
+    let (mut trail, mut first) = (Vec::with_capacity(m), 0);
     let mut here = table.root as u32;
     chosen[here as usize] = rng.random_range(0..table.sizes[here as usize]);
     loop {
         order.push(here);
+        trail.push(here);
         visited[here as usize] = true;
         if order.len() == m {
             return SearchTour::new(table, order, chosen);
@@ -42,10 +46,22 @@ pub(super) fn construct(table: &Table, rng: &mut ChaCha8Rng) -> SearchTour {
             let skip = rng.random_range(0..odds) == 0;
             consider(b, &mut best, skip);
         }
-        if best.1 == here {
+        if best.1 == here && table.has_all_pairs() {
             for b in 0..m as u32 {
                 consider(b, &mut best, false);
             }
+        }
+        while best.1 == here {
+            // A dead end: what is near the way that led here.
+            let Some(&back) = trail.last() else { break };
+            table.near_out(back).for_each(|(b, _)| consider(b, &mut best, false));
+            if best.1 == here {
+                trail.pop();
+            }
+        }
+        while best.1 == here {
+            consider(first, &mut best, false);
+            first += u32::from(best.1 == here);
         }
         chosen[best.1 as usize] = best.2;
         here = best.1;

@@ -4,6 +4,8 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::adjacency::{Adjacency, Misfit};
+
 /// A generalised travelling-salesman instance: visit every cluster once, at one node of each.
 ///
 /// Clusters count from 0, nodes from 0 within their cluster. Costs may have any unit, the same as
@@ -179,11 +181,17 @@ pub enum InstanceError {
 #[derive(Clone)]
 enum Store {
     Dense(Arc<[f64]>),
-    Blocks { index: Arc<[usize]>, data: Arc<[f64]> },
-    OnDemand { adjacent: Option<Arc<[bool]>>, cost: CostFn },
+    /// Where each pair's block begins in `data`.
+    Blocks {
+        adjacent: Adjacency,
+        starts: Arc<[usize]>,
+        data: Arc<[f64]>,
+    },
+    OnDemand {
+        adjacent: Option<Adjacency>,
+        cost: CostFn,
+    },
 }
-
-const ABSENT: usize = usize::MAX;
 
 impl Instance {
     /// A checked instance of clusters with `sizes` nodes. On-demand costs are not checked here; a
@@ -243,7 +251,7 @@ impl Instance {
             }
             Costs::Blocks(blocks) => pack(sizes, blocks)?,
             Costs::OnDemand(OnDemand { neighbours, cost }) => {
-                let adjacent = neighbours.map(|lists| adjacency(m, &lists)).transpose()?;
+                let adjacent = neighbours.map(|lists| adjacency(m, lists)).transpose()?;
                 Store::OnDemand { adjacent, cost }
             }
         };
@@ -293,17 +301,12 @@ impl Instance {
             Store::Dense(matrix) => {
                 matrix[(self.offsets[a] + i) * self.nodes() + self.offsets[b] + j]
             }
-            Store::Blocks { index, data } => match index[a * self.sizes.len() + b] {
-                ABSENT => f64::INFINITY,
-                at => data[at + i * self.sizes[b] + j],
+            Store::Blocks { adjacent, starts, data } => match adjacent.number(a, b) {
+                None => f64::INFINITY,
+                Some(pair) => data[starts[pair] + i * self.sizes[b] + j],
             },
-            Store::OnDemand { adjacent, cost } => {
-                if adjacent.as_ref().is_some_and(|t| !t[a * self.sizes.len() + b]) {
-                    f64::INFINITY
-                } else {
-                    cost(a, i, b, j)
-                }
-            }
+            Store::OnDemand { cost, .. } if self.adjacent(a, b) => cost(a, i, b, j),
+            Store::OnDemand { .. } => f64::INFINITY,
         };
         cost.is_finite().then_some(cost)
     }
@@ -313,11 +316,11 @@ impl Instance {
     /// # Panics
     /// May panic where a cluster does not exist.
     pub fn adjacent(&self, a: usize, b: usize) -> bool {
-        let at = a * self.sizes.len() + b;
+        let joins = |adjacent: &Adjacency| adjacent.number(a, b).is_some();
         match &self.store {
             Store::Dense(_) => true,
-            Store::Blocks { index, .. } => index[at] != ABSENT,
-            Store::OnDemand { adjacent, .. } => adjacent.as_ref().is_none_or(|t| t[at]),
+            Store::Blocks { adjacent, .. } => joins(adjacent),
+            Store::OnDemand { adjacent, .. } => adjacent.as_ref().is_none_or(joins),
         }
     }
 
@@ -355,38 +358,38 @@ impl fmt::Debug for Instance {
 
 /// Packs blocks into one array, checked.
 fn pack(sizes: &[usize], blocks: Vec<Block>) -> Result<Store, InstanceError> {
-    let m = sizes.len();
-    let mut index = vec![ABSENT; m * m];
+    let pairs = blocks.iter().map(|block| (block.from, block.to)).collect();
+    let adjacent = joined(sizes.len(), pairs)?;
+    let mut starts = vec![0; adjacent.len()];
     let mut data = Vec::with_capacity(blocks.iter().map(|b| b.costs.len()).sum());
     for Block { from, to, costs } in blocks {
-        if from >= m || to >= m || from == to {
-            return Err(InstanceError::ClusterPair { from, to, clusters: m });
-        }
-        if index[from * m + to] != ABSENT {
-            return Err(InstanceError::DuplicateBlock { from, to });
-        }
         let what = format!("block {from} → {to}");
         check_length(&what, costs.len(), sizes[from] * sizes[to])?;
         check_costs(&what, &costs, 0..costs.len())?;
-        index[from * m + to] = data.len();
+        if let Some(pair) = adjacent.number(from, to) {
+            starts[pair] = data.len();
+        }
         data.extend_from_slice(&costs);
     }
-    Ok(Store::Blocks { index: index.into(), data: data.into() })
+    Ok(Store::Blocks { adjacent, starts: starts.into(), data: data.into() })
 }
 
-/// Row-major table of the cluster pairs that neighbour lists join.
-fn adjacency(m: usize, lists: &[Vec<usize>]) -> Result<Arc<[bool]>, InstanceError> {
+/// The cluster pairs that neighbour lists join.
+fn adjacency(m: usize, lists: Vec<Vec<usize>>) -> Result<Adjacency, InstanceError> {
     check_length("the neighbour lists", lists.len(), m)?;
-    let mut table = vec![false; m * m];
-    for (from, list) in lists.iter().enumerate() {
-        for &to in list {
-            if to >= m || to == from {
-                return Err(InstanceError::ClusterPair { from, to, clusters: m });
-            }
-            table[from * m + to] = true;
-        }
-    }
-    Ok(table.into())
+    let listed = lists.into_iter().enumerate().flat_map(|(from, mut list)| {
+        list.sort_unstable();
+        list.dedup();
+        list.into_iter().map(move |to| (from, to))
+    });
+    joined(m, listed.collect())
+}
+
+fn joined(m: usize, pairs: Vec<(usize, usize)>) -> Result<Adjacency, InstanceError> {
+    Adjacency::new(m, pairs).map_err(|misfit| match misfit {
+        Misfit::Clusters(from, to) => InstanceError::ClusterPair { from, to, clusters: m },
+        Misfit::Twice(from, to) => InstanceError::DuplicateBlock { from, to },
+    })
 }
 
 fn check_length(what: &str, found: usize, expected: usize) -> Result<(), InstanceError> {

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod adjacency;
 mod atsp;
 mod bound;
 mod candidate_nodes;

@@ -15,6 +15,8 @@ pub(super) struct Pieces {
     parts: Vec<u32>,
     /// Clusters of each subtour; 0 once it was joined with another.
     sizes: Vec<u32>,
+    /// Subtour of each cluster.
+    labels: Vec<u32>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -113,14 +115,19 @@ impl Pieces {
             *part = number[*part as usize];
         }
         self.parts = of_piece;
+        self.labels.resize(tour.order.len(), NONE);
+        for (k, &part) in self.parts.iter().enumerate() {
+            let clusters = &tour.order[self.starts[k] as usize..self.starts[k + 1] as usize];
+            clusters.iter().for_each(|&c| self.labels[c as usize] = part);
+        }
         self.sizes.clear();
         self.sizes.extend(found.iter().map(|&(_, size, _)| size));
     }
 
     /// The subtour of a cluster.
     #[inline]
-    pub(super) fn part_of(&self, tour: &SearchTour, cluster: u32) -> u32 {
-        self.parts[self.piece(tour.position[cluster as usize])]
+    pub(super) fn part_of(&self, cluster: u32) -> u32 {
+        self.labels[cluster as usize]
     }
 
     /// The subtour of the fewest clusters; `None`, and all is forgotten, once there is but one.
@@ -141,8 +148,9 @@ impl Pieces {
         }
     }
 
-    /// Makes the clusters of one subtour those of another.
-    pub(super) fn join(&mut self, part: u32, into: u32) {
+    /// Makes the clusters of one subtour, which are given, those of another.
+    pub(super) fn join(&mut self, part: u32, clusters: &[u32], into: u32) {
+        clusters.iter().for_each(|&c| self.labels[c as usize] = into);
         for p in self.parts.iter_mut().filter(|p| **p == part) {
             *p = into;
         }

@@ -16,6 +16,8 @@ use crate::table::Table;
 const FIRST_POPULATION: usize = 30;
 /// Trials per cluster that each tour of a fresh population gets.
 const TRIALS_PER_CLUSTER: u64 = 5;
+/// Trials that must suffice for a tour and its crossing, or one for each cluster where they are more.
+const LEAST_TRIALS: u64 = 64;
 /// Children made of one pair of parents at most.
 const CHILDREN: usize = 30;
 /// Generations without an improvement that end an epoch.
@@ -64,9 +66,10 @@ pub(super) fn evolve(
 ) {
     let Epoch { number, limit, likely } = epoch;
     let size = (FIRST_POPULATION as u64) << number.min(3);
-    // Small budgets get small pools: half of the trials are left for the crossing.
+    // Small budgets get small pools of tours that are worth crossing: half of the trials are left for
+    // that.
     let sure = limit.min(likely);
-    let size = size.min(sure / 64).max(1) as usize;
+    let size = size.min(sure / LEAST_TRIALS.max(table.m as u64)).max(1) as usize;
     let size = if table.is_small() { 1 } else { size };
     let trials = (TRIALS_PER_CLUSTER * table.m as u64).min(sure / (2 * size as u64));
     let tasks: Vec<_> = (0..size).map(|k| (k, streams.next())).collect();

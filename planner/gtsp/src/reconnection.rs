@@ -23,9 +23,8 @@ impl<'a> Reconnection<'a> {
     #[inline]
     pub(super) fn new(table: &'a Table, p: (u32, u32), a: u32, b: u32, q: (u32, u32)) -> Self {
         let (add_in, into) = table.row(p.0, p.1, a);
-        let (add, block) = table.open_block(a, b);
+        let (add, block, lows) = table.open_block(a, b);
         let (add_out, out) = table.column(b, q.0, q.1);
-        let lows = table.row_lowest(a, b);
         let least_out = smallest(out);
         let add = i64::from(add_in) + i64::from(add) + i64::from(add_out);
         let paths = into.iter().zip(lows).map(|(d, low)| d + low);

@@ -161,7 +161,8 @@ impl<'a> Rooted<'a> {
                 near.iter_mut().for_each(|(cost, b)| *cost = low(*b as usize, most));
             }
         }
-        near.into_iter().map(|(_, b)| b).collect()
+        // A list of its own: `into_iter` would keep the room for all clusters.
+        near.iter().map(|&(_, b)| b).collect()
     }
 
     /// Entries of the blocks that the search sees.

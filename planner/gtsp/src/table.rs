@@ -5,7 +5,7 @@
 //! no higher, so that a huge h neither overflows nor freezes the search; what a tour really costs
 //! is always taken from the instance.
 
-use crate::instance::{Ends, Instance};
+use crate::instance::{Ends, Instance, Jump};
 use crate::pairs::{Pair, Pairs};
 use crate::quantiser::Quantiser;
 use crate::rooted::Rooted;
@@ -26,6 +26,8 @@ pub(super) struct Table {
     pub(super) reversible: bool,
     /// Mean over the clusters of the cheapest arc out of them: the scale of the temperature.
     pub(super) typical: f64,
+    /// No arc costs less, nor does a jump.
+    pub(super) least: i32,
     pairs: Pairs,
     data: Vec<i32>,
     /// The cheapest entry of each row of each block.
@@ -58,7 +60,7 @@ impl Table {
         let mut blocks = Blocks::of(&rooted);
         let reversible = blocks.reversible(&rooted);
         blocks.transpose(&rooted, reversible);
-        let Blocks { pairs, mut data } = blocks;
+        let Blocks { pairs, mut data, least } = blocks;
         data.extend_from_slice(&[0; LANES]);
         let mut table = Self {
             m,
@@ -66,6 +68,7 @@ impl Table {
             sizes,
             reversible,
             typical: 1.0,
+            least,
             pairs,
             data,
             outer_root: root >= instance.clusters(),
@@ -118,6 +121,7 @@ impl Table {
             sizes,
             reversible: self.reversible,
             typical: self.typical,
+            least: self.least,
             pairs,
             data,
             outer_root: self.outer_root,
@@ -136,6 +140,11 @@ impl Table {
     #[inline]
     pub(super) fn is_small(&self) -> bool {
         self.m < SMALL
+    }
+
+    /// Whether the costs between all clusters are known, not those between near ones alone.
+    pub(super) fn has_all_pairs(&self) -> bool {
+        matches!(self.pairs, Pairs::All { .. })
     }
 
     /// Whether arcs from `a` to `b` are known one by one.
@@ -233,14 +242,16 @@ impl Table {
         self.pairs.get(a, b).lowest
     }
 
-    /// The block from `a` to `b` with the data that follow it, at least `LANES` entries.
+    /// The block from `a` to `b` with the data that follow it, at least `LANES` entries, and for each
+    /// node of `a` the cheapest entry of its row.
     #[inline]
-    pub(super) fn open_block(&self, a: u32, b: u32) -> (i32, &[i32]) {
+    pub(super) fn open_block(&self, a: u32, b: u32) -> (i32, &[i32], &[i32]) {
         let pair = self.pairs.get(a, b);
-        (pair.add, &self.data[pair.at as usize..])
+        let lows = &self.row_lowest[pair.rows as usize..];
+        (pair.add, &self.data[pair.at as usize..], &lows[..self.sizes[a as usize] as usize])
     }
 
-    /// For each node of `a` the cheapest entry of its row in [`Self::open_block`].
+    /// For each node of `a` the cheapest entry of its row in [`Self::block`].
     #[inline]
     pub(super) fn row_lowest(&self, a: u32, b: u32) -> &[i32] {
         let at = self.pairs.get(a, b).rows as usize;
@@ -284,6 +295,7 @@ impl Table {
 struct Blocks {
     pairs: Pairs,
     data: Vec<i32>,
+    least: i32,
 }
 
 impl Blocks {
@@ -311,7 +323,15 @@ impl Blocks {
             }
             pairs.set(a as u32, b as u32, pair);
         }
-        Self { pairs, data }
+        // Arcs that are not kept are dearer than some that are.
+        let prices_below_zero = match rooted.instance.jump() {
+            Jump::Forbidden => false,
+            Jump::Uniform(price) => *price < 0.0,
+            Jump::Table(prices) => prices.iter().any(|price| *price < 0.0),
+        };
+        let below_zero = prices_below_zero || data.iter().any(|cost| *cost < 0);
+        let least = if below_zero { quantiser.steps(f64::NEG_INFINITY) } else { 0 };
+        Self { pairs, data, least }
     }
 
     /// Whether the costs between all clusters but the root are symmetric.

@@ -6,7 +6,8 @@
 //! 2. The order and the choice among the best charts' joint vectors is a generalised travelling
 //!    salesman.
 //! 3. The route is relaxed over the tolerance, poses are moved to better places, and what each
-//!    pose would be if it was visited from its neighbours' joint vectors enters the next round.
+//!    pose would be if it was visited from its neighbours' joint vectors enters the next round, for as
+//!    long as a round gains anything.
 
 use std::f64::consts::PI;
 
@@ -86,13 +87,12 @@ pub(super) fn search(
         let mut route = order(&task, &choices, config.trials, seed)?;
         settle(&task, &mut route);
         let cost = task.cost(&route);
-        if best.as_ref().is_none_or(|(least, _)| cost < *least) {
-            best = Some((cost, route));
-        }
-        if let Some((_, route)) = &best {
-            choices = enrich(&task, route);
-        }
         progress.tick();
+        if best.as_ref().is_some_and(|(least, _)| cost >= *least) {
+            break;
+        }
+        choices = enrich(&task, &route);
+        best = Some((cost, route));
     }
     let (_, route) = best.ok_or(TaskError::NothingMet { poses: poses.len() })?;
     Ok((route, unmet))
@@ -176,7 +176,8 @@ fn neighbours(poses: &[Isometry3<f64>]) -> Vec<Vec<usize>> {
                 others.truncate(NEIGHBOURS);
             }
             others.sort_by(nearer);
-            others.into_iter().map(|(_, b)| b).collect()
+            // A list of its own: `into_iter` would keep the room for all poses.
+            others.iter().map(|&(_, b)| b).collect()
         })
         .collect()
 }
@@ -340,4 +341,18 @@ fn enrich(task: &Task<'_>, route: &Route) -> Vec<Vec<Point>> {
             choices
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_of_neighbours_keeps_no_room_for_all_poses() {
+        let poses: Vec<Isometry3<f64>> =
+            (0..500).map(|k| Isometry3::translation(0.01 * f64::from(k), 0.0, 0.0)).collect();
+        let lists = neighbours(&poses);
+        assert_eq!(lists[7][..4], [6, 8, 5, 9]);
+        assert!(lists.iter().all(|list| list.capacity() < 2 * NEIGHBOURS));
+    }
 }
