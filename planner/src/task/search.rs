@@ -350,7 +350,7 @@ mod tests {
     #[test]
     fn a_list_of_neighbours_keeps_no_room_for_all_poses() {
         let poses: Vec<Isometry3<f64>> =
-            (0..500).map(|k| Isometry3::translation(0.01 * f64::from(k), 0.0, 0.0)).collect();
+            (0..500).map(|k| Isometry3::translation(1.01f64.powi(k), 0.0, 0.0)).collect();
         let lists = neighbours(&poses);
         assert_eq!(lists[7][..4], [6, 8, 5, 9]);
         assert!(lists.iter().all(|list| list.capacity() < 2 * NEIGHBOURS));

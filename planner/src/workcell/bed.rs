@@ -22,10 +22,11 @@ const UNEVEN: f64 = 0.025;
 const TILTS: [f64; 3] = [0.07, 0.14, 0.21];
 /// Directions of each.
 const TURNS: usize = 8;
-/// Places on each piece of a line at which the pad's facing is looked at. Pieces are some 6 mm long
-/// and points of a scan a few apart, so that none of those that come to lie under the pad's centre
-/// is passed over.
-const LOOKS: usize = 4;
+/// A point that lies too aslant stays so much farther from the pad's centre than the nearest one: the arm
+/// follows the line within 0.1 mm. \[m\]
+const GRAZE: f64 = 0.0003;
+/// Least step along a line where such a point is near. \[m\]
+const CREEP: f64 = 0.0001;
 /// The pad is raised and let down no more steeply than this along its way.
 const STEEPEST: f64 = 0.25;
 
@@ -156,25 +157,45 @@ impl Bed {
 
     /// Whether the pad would sweep the points under its centre.
     fn faces_along(&self, line: &[SurfacePoint]) -> bool {
-        let faces_first = line.first().is_none_or(|at| self.faces(&at.point, &at.normal));
-        faces_first
-            && line.windows(2).all(|w| {
-                let [a, b] = [w[0].normal.into_inner(), w[1].normal.into_inner()];
-                (1..=LOOKS).all(|look| {
-                    let share = look as f64 / LOOKS as f64;
-                    let point = w[0].point + (w[1].point - w[0].point) * share;
-                    self.faces(&point, &UnitVector3::new_normalize(a.lerp(&b, share)))
-                })
-            })
+        line.windows(2).all(|w| self.faces_between(&w[0], &w[1]))
     }
 
     /// Whether a pad that is led through `point` would sweep what is there, and what is where its
     /// centre comes to be.
     fn faces(&self, point: &Point3<f64>, axis: &UnitVector3<f64>) -> bool {
-        let centre = point + axis.scale(self.stand_off);
-        [*point, centre]
-            .iter()
-            .all(|at| self.surface.normal_near(at).is_none_or(|own| axis.dot(&own) >= self.facing))
+        let at = SurfacePoint { point: *point, normal: *axis };
+        self.faces_between(&at, &at)
+    }
+
+    /// Whether a pad that is led from one place to the next would sweep what is there, and what is where
+    /// its centre comes to be: at no place on the way is the nearest point one that lies too aslant.
+    /// What is far from being the nearest does not become it for as long as its lead lasts.
+    fn faces_between(&self, from: &SurfacePoint, to: &SurfacePoint) -> bool {
+        let is_aslant =
+            |n: &UnitVector3<f64>| from.normal.dot(n).min(to.normal.dot(n)) < self.facing;
+        [0.0, self.stand_off].into_iter().all(|off| {
+            let start = from.point + from.normal.scale(off);
+            let way = to.point + to.normal.scale(off) - start;
+            let length = way.norm();
+            let mut gone = 0.0;
+            loop {
+                let at = start + way.scale(if length > 0.0 { gone / length } else { 0.0 });
+                let near = self.surface.distance_to(&at, f64::INFINITY, |_| true);
+                // Without a surface there is nothing to face.
+                let near = near.unwrap_or(f64::INFINITY);
+                let reach = near + 2.0 * (length - gone) + GRAZE;
+                let Some(aslant) = self.surface.distance_to(&at, reach, is_aslant) else {
+                    return true;
+                };
+                if aslant < near + GRAZE {
+                    return false;
+                }
+                if gone >= length {
+                    return true;
+                }
+                gone = (gone + (0.5 * (aslant - near - GRAZE)).max(CREEP)).min(length);
+            }
+        })
     }
 
     /// How far a pad with its centre here, already so far `off` the surface, has to be raised along
@@ -294,6 +315,27 @@ mod tests {
         let beside = bed.laid(patch(Point3::new(0.04, 0.012, 0.0))).expect("an even floor");
         assert!(bed.faces(&beside.centre, &beside.normal));
         assert_eq!(bed.laid(patch(Point3::new(0.0, 0.5, 0.0))), None, "over nothing");
+    }
+
+    #[test]
+    fn a_point_that_is_under_the_pad_for_half_a_millimetre_is_faced_or_not_passed() {
+        let mut scene = ridge(0.0);
+        let leans = |p: &Point3<f64>| (p - Point3::new(0.04, 0.0, 0.0)).norm() < 0.002;
+        let leaning = scene.surface.points.iter().position(leans).expect("a floor has points");
+        let aslant = Vector3::new(0.0, 50f64.to_radians().sin(), 50f64.to_radians().cos());
+        scene.surface.normals[leaning] = UnitVector3::new_normalize(aslant);
+        let bed = Bed::new(&scene, &laid());
+        // It is the nearest one within 2 mm to all sides; a way cuts a corner of that.
+        let passes = |inside: f64| {
+            let middle = Point3::new(0.042 - inside, 0.002 - inside, 0.0);
+            let at = |along: f64| SurfacePoint {
+                point: middle + Vector3::new(along, -along, 0.0),
+                normal: flat(0.0).normal,
+            };
+            bed.faces_between(&at(-0.0027), &at(0.0015))
+        };
+        assert!(!passes(0.0002));
+        assert!(passes(-0.0006));
     }
 
     #[test]

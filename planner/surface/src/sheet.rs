@@ -175,6 +175,19 @@ impl Surface {
         Some(self.normals[nearest as usize])
     }
 
+    /// Distance to the nearest of the scan's points whose normal is as asked for, within 4 cm and within
+    /// `reach`. \[m\]
+    pub fn distance_to(
+        &self,
+        point: &Point3<f64>,
+        reach: f64,
+        is_asked: impl Fn(&UnitVector3<f64>) -> bool,
+    ) -> Option<f64> {
+        let is_asked = |k: u32| is_asked(&self.normals[k as usize]);
+        let (_, squared) = self.grid.nearest(point, reach.min(REACH), is_asked)?;
+        Some(squared.sqrt())
+    }
+
     /// Distance from a point to the scanned surface: to the plane through the raw points around
     /// its foot, and beyond their border also along the plane. Infinite farther than 10 cm away.
     /// \[m\]
