@@ -85,11 +85,14 @@ impl Bed {
     /// and none of them be near it), or the pad faces it in no way.
     #[must_use]
     pub fn laid(&self, patch: Patch) -> Option<Patch> {
-        self.surface.project(&patch.centre, &patch.normal)?;
+        let foot = self.surface.project(&patch.centre, &patch.normal)?;
+        // A plane through uneven points has its centre off the surface.
+        let off = (patch.centre - foot.point).dot(&patch.normal).max(0.0);
+        let most = (self.highest - off).max(0.0);
         let own = self.surface.normal_near(&patch.centre).unwrap_or(patch.normal);
         let over = |normal| self.over(&SurfacePoint { point: patch.centre, normal }).max(0.0);
         let raised = |normal: UnitVector3<f64>, over: f64| Patch {
-            centre: patch.centre + normal.scale(over.min(self.highest)),
+            centre: patch.centre + normal.scale(over.min(most)),
             normal,
             ..patch.clone()
         };
@@ -315,6 +318,24 @@ mod tests {
         let beside = bed.laid(patch(Point3::new(0.04, 0.012, 0.0))).expect("an even floor");
         assert!(bed.faces(&beside.centre, &beside.normal));
         assert_eq!(bed.laid(patch(Point3::new(0.0, 0.5, 0.0))), None, "over nothing");
+    }
+
+    #[test]
+    fn a_patch_off_the_surface_is_raised_by_so_much_less() {
+        let tool = laid();
+        let mut scene = ridge(0.0);
+        // Something all around, so that no tilt keeps the pad away from it.
+        for (x, y) in [(0.02, 0.0), (0.08, 0.0), (0.05, -0.03), (0.05, 0.03)] {
+            scene.surroundings.push(Point3::new(x, y, 0.02));
+        }
+        let bed = Bed::new(&scene, &tool);
+        for z in [0.0, 0.0015, 0.003] {
+            let normal = UnitVector3::new_normalize(Vector3::z());
+            let centre = Point3::new(0.05, 0.0, z);
+            let patch = Patch { centre, normal, points: Vec::new(), rmse: 0.0 };
+            let found = bed.laid(patch).expect("a floor").centre;
+            assert!((found.z - HIGHEST).abs() < 5e-4, "{z} m: {found}");
+        }
     }
 
     #[test]
