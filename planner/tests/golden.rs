@@ -82,7 +82,7 @@ fn digests(scene: &Scene, job: &Job) -> Vec<(String, u64)> {
         for (speed, profile) in
             [("velocity", Profile::Velocity), ("acceleration", Profile::Acceleration)]
         {
-            let job = Job { method, profile, ..job.clone() };
+            let job = Job { method: Some(method), profile, ..job.clone() };
             let outcome = run(&robot, scene, &job, &Silent).expect("a plan");
             assert_eq!(outcome.figures.verification.violations, []);
             found.push((format!("{name} {speed}"), outcome.plan.digest().expect("short enough")));

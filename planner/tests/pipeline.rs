@@ -14,7 +14,7 @@ fn job(method: Method, cost: CostKind) -> Job {
     let held = vec![("torso_lift_joint".to_owned(), 0.2)];
     Job {
         stance: StanceChoice::Given(Stance { base: [-0.708, -0.004, 1.047], height: 0.0, held }),
-        method,
+        method: Some(method),
         cost,
         ik_samples: 30,
         refinements: 1,
@@ -32,7 +32,8 @@ fn check(outcome: &Outcome) {
     let added = &outcome.patches[f.patches..];
     let strokes = added.iter().filter(|patch| patch.points.is_empty()).count();
     println!("{} patches, {strokes} of them strokes, were added", added.len());
-    assert_eq!((f.fill_in_patches, f.strokes), (added.len() - strokes, strokes));
+    let others = added.len() - strokes - f.places;
+    assert_eq!((f.fill_in_patches, f.strokes), (others, strokes));
     let v = &outcome.figures.verification;
     assert!(v.violations.is_empty(), "{:?}", v.violations);
     assert!(v.coverage_reachable > 0.95, "reachable points: {}", v.coverage_reachable);
@@ -49,6 +50,19 @@ fn the_same_seed_gives_the_same_plan_whatever_the_number_of_threads() {
     let (one, two) = (plan_on(1, &seat, &job), plan_on(2, &seat, &job));
     check(&one);
     assert_eq!(one.plan.digest().expect("short enough"), two.plan.digest().expect("short enough"));
+    assert_eq!(one.plan, two.plan);
+}
+
+#[test]
+fn a_raster_goes_in_strips_and_is_the_same_whatever_the_number_of_threads() {
+    let seat = common::seat();
+    let job =
+        Job { profile: Profile::Acceleration, smooth: true, ..job(Method::Raster, CostKind::Time) };
+    let (one, two) = (plan_on(1, &seat, &job), plan_on(2, &seat, &job));
+    check(&one);
+    assert_eq!(one.plan.method, Method::Raster);
+    assert!(one.figures.places > 20, "{:?}", one.figures.places);
+    assert!(one.figures.verification.coverage_reachable > 0.98);
     assert_eq!(one.plan, two.plan);
 }
 

@@ -22,19 +22,6 @@ macro_rules! choices {
 }
 
 choices! {
-    /// How the order is found.
-    MethodArg for Method {
-        /// Shortest Euclidean tour; the headings follow from it.
-        Tsp,
-        /// A node for each patch and incident edge; distance and turning are weighed (Eq. 4).
-        Curvature,
-        /// A node for each patch, incident edge and sample of the inverse kinematics; the cost of
-        /// the joint motion is weighed (Eq. 1-3).
-        Joint,
-    }
-}
-
-choices! {
     /// What is minimised.
     CostArg for CostKind {
         /// The sum of all joint displacements (Eq. 1).
@@ -90,6 +77,36 @@ choices! {
         Chair,
         /// Table II.
         BobbyCar,
+    }
+}
+
+/// How the order is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Shortest Euclidean tour; the headings follow from it.
+    Tsp,
+    /// A node for each patch and incident edge; distance and turning are weighed (Eq. 4).
+    Curvature,
+    /// A node for each patch, incident edge and sample of the inverse kinematics; the cost of
+    /// the joint motion is weighed (Eq. 1-3).
+    Joint,
+    /// Strips side by side, the pad across them, in place of the patches.
+    Raster,
+    /// Curvature, joint or raster: the plan that takes the least time of those that sweep as much.
+    Best,
+}
+
+impl MethodArg {
+    /// The method; `None`: the best one.
+    #[must_use]
+    pub fn method(self) -> Option<Method> {
+        match self {
+            Self::Tsp => Some(Method::Tsp),
+            Self::Curvature => Some(Method::Curvature),
+            Self::Joint => Some(Method::Joint),
+            Self::Raster => Some(Method::Raster),
+            Self::Best => None,
+        }
     }
 }
 

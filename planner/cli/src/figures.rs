@@ -85,6 +85,9 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("points", f.points.to_string());
     row("patches, reachable", format!("{}, {}", f.patches, f.reachable));
+    if f.places > 0 {
+        row("places on strips", f.places.to_string());
+    }
     row("fill-in patches, strokes", format!("{}, {}", f.fill_in_patches, f.strokes));
     row("edges, components", format!("{} of {}, {}", f.edges, f.edge_candidates, f.components));
     row("base x, y, yaw", told(&f.base));

@@ -379,7 +379,7 @@ fn job(
             EndArg::At(end) => End::At(posture(end, "--end")?),
         },
         after,
-        method: args.method.into(),
+        method: args.method.method(),
         cost: args.cost.into(),
         ik_samples: args.ik_samples as usize,
         v_max: args.v_max,

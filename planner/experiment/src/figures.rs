@@ -36,8 +36,12 @@ const POINTS: usize = 1200;
 const INK: RGBColor = RGBColor(38, 50, 66);
 const FAINT: RGBColor = RGBColor(176, 186, 198);
 const RED: RGBColor = RGBColor(204, 51, 51);
-const COLORS: [RGBColor; 3] =
-    [RGBColor(120, 130, 142), RGBColor(226, 138, 36), RGBColor(28, 110, 180)];
+const COLORS: [RGBColor; 4] = [
+    RGBColor(120, 130, 142),
+    RGBColor(226, 138, 36),
+    RGBColor(28, 110, 180),
+    RGBColor(46, 140, 90),
+];
 
 /// Writes all figures into a directory; returns their paths.
 ///
@@ -267,6 +271,7 @@ fn color(method: Method) -> RGBColor {
         Method::Tsp => COLORS[0],
         Method::Curvature => COLORS[1],
         Method::Joint => COLORS[2],
+        Method::Raster => COLORS[3],
     }
 }
 
@@ -275,6 +280,7 @@ fn label(method: Method) -> &'static str {
         Method::Tsp => "TSP",
         Method::Curvature => "Curvature-GTSP",
         Method::Joint => "Joint-GTSP",
+        Method::Raster => "raster",
     }
 }
 

@@ -109,6 +109,7 @@ pub fn by_cost<C: Cost>(
                 stops.par_iter().map(|stop| cluster(setting, &[*stop], task.samples)).collect();
             (stops, clusters)
         }
+        Method::Raster => return Err(FormulationError::NoOrder),
         Method::Joint => {
             let clusters: Vec<Cluster> = (0..patches.len())
                 .into_par_iter()

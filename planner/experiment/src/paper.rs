@@ -35,6 +35,7 @@ pub fn cell(
         Method::Tsp => 0,
         Method::Curvature => 1,
         Method::Joint => 2,
+        Method::Raster => return None,
     };
     let side = match optimised {
         CostKind::Time => 0,

@@ -310,8 +310,12 @@ pub fn tracked(
     for optimised in [CostKind::Time, CostKind::Effort] {
         for method in METHODS {
             for repeat in 0..repeats {
-                let job_of =
-                    Job { method, cost: optimised, seed: job.seed + repeat as u64, ..job.clone() };
+                let job_of = Job {
+                    method: Some(method),
+                    cost: optimised,
+                    seed: job.seed + repeat as u64,
+                    ..job.clone()
+                };
                 let outcome = pipeline::run(robot, scene, &job_of, &Silent)?;
                 progress.tick();
                 let f = &outcome.figures;

@@ -25,6 +25,9 @@ use crate::workcell::{Bed, Workcell};
 
 /// Share of the points to sweep that a fair way may leave out of what the way as it was sweeps.
 const LOSS: f64 = 0.003;
+/// Share of the widest windows down to which they are narrowed first, for the sake of what is swept:
+/// a scan's unevenness is averaged by narrow ones too, and corners are hardly cut.
+const GENTLE: f64 = 0.25;
 /// Rounds of narrowing windows where a piece cannot be followed, and where it sweeps too little.
 const ROUNDS: usize = 40;
 
@@ -53,6 +56,7 @@ pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan 
     let before = swept(plan);
     let whole = count(&vec![true; keep.points.len()]);
     let least: [f64; 2] = std::array::from_fn(|i| count(&before)[i] - LOSS * whole[i]);
+    let mut narrowest = GENTLE;
     loop {
         pieces.par_iter_mut().for_each(|piece| piece.make(cell, bed));
         let made = assembled(plan, &pieces);
@@ -63,10 +67,13 @@ pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan 
         let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);
         let lost: Vec<_> = lost.map(|i| keep.scan.points[i]).collect();
         let reach = 0.5 * cell.tool.width.hypot(cell.tool.length);
-        let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, reach));
+        let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, reach, narrowest));
         if given.filter(|given| *given).count() == 0 {
-            // What is lost is near none of them: who knows why, so all is as it was.
-            return plan.clone();
+            if narrowest == 0.0 {
+                // What is lost is near none of them: who knows why, so all is as it was.
+                return plan.clone();
+            }
+            narrowest = 0.0;
         }
     }
 }
@@ -106,9 +113,9 @@ impl Fair {
         self.made = Some(Vec::new());
     }
 
-    /// Narrows the windows wherever the piece as it was came near to what is swept no more; whether
-    /// there was anything to narrow.
-    fn give_back(&mut self, lost: &[nalgebra::Point3<f64>], reach: f64) -> bool {
+    /// Narrows the pad's windows, down to a share of the widest, wherever the piece as it was came near
+    /// to what is swept no more; whether there was anything to narrow.
+    fn give_back(&mut self, lost: &[nalgebra::Point3<f64>], reach: f64, narrowest: f64) -> bool {
         let mut places: Vec<f64> =
             lost.iter().filter_map(|point| self.piece.nearest(point, reach)).collect();
         places.sort_by(f64::total_cmp);
@@ -116,7 +123,13 @@ impl Fair {
         if self.made.as_ref().is_some_and(Vec::is_empty) || places.is_empty() {
             return false;
         }
-        self.made = if self.windows.narrow(&places) { None } else { Some(Vec::new()) };
+        if self.windows.narrow_pad(&places, narrowest) {
+            self.made = None;
+        } else if narrowest == 0.0 {
+            self.made = Some(Vec::new());
+        } else {
+            return false;
+        }
         true
     }
 }

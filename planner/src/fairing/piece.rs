@@ -171,9 +171,10 @@ impl Piece {
     /// Averaged around a place of it. The window's ends lie within the piece, so its ends stay.
     pub(super) fn mean(&self, u: f64, window: Window) -> Mean {
         let near = self.averaged(u, window.place);
-        let wide = self.averaged(u, window.posture);
         let State { centre, into, rise, .. } = near;
-        Mean { q: wide.q, centre, travel: wide.travel, into, rise }
+        let travel = self.averaged(u, window.heading).travel;
+        let q = self.averaged(u, window.joints).q;
+        Mean { q, centre, travel, into, rise }
     }
 
     /// How far the averaged way has to be shifted along the pad's axis at places [`LAID`] apart.

@@ -2,9 +2,10 @@
 
 /// Spacing of the places at which widths are kept. \[m\]
 const GRID: f64 = 0.002;
-/// The widest windows, of the pad's place and of its heading and the joints. \[m\]
+/// The widest windows, of the pad's place, of its heading, and of the joints. \[m\]
 const PLACE: f64 = 0.2;
-const POSTURE: f64 = 0.4;
+const HEADING: f64 = 0.4;
+const JOINTS: f64 = 0.4;
 /// Steepest change of a window's share along the way. \[1/m\]
 const STEEPEST: f64 = 8.0;
 /// Half of the length over which changes of the share are rounded. \[m\]
@@ -17,12 +18,50 @@ const NARROWEST: f64 = 0.05;
 pub(super) struct Window {
     /// Of the pad's place and normal.
     pub(super) place: f64,
-    /// Of its heading and the joints.
-    pub(super) posture: f64,
+    /// Of its heading.
+    pub(super) heading: f64,
+    /// Of the joints, which says what they do in the null space.
+    pub(super) joints: f64,
 }
 
-/// The windows along a piece, as shares of the widest.
+/// The windows along a piece.
 pub(super) struct Windows {
+    /// Of the pad.
+    pad: Shares,
+    /// Of the joints: where the pad goes, and so what it sweeps, does not depend on them.
+    joints: Shares,
+}
+
+impl Windows {
+    /// The widest, along a piece of some length. \[m\]
+    pub(super) fn new(length: f64) -> Self {
+        Self { pad: Shares::new(length), joints: Shares::new(length) }
+    }
+
+    /// At a place of it. At its ends there is none, so that it ends where it did.
+    pub(super) fn at(&self, u: f64) -> Window {
+        Window {
+            place: self.pad.of(PLACE, u),
+            heading: self.pad.of(HEADING, u),
+            joints: self.joints.of(JOINTS, u),
+        }
+    }
+
+    /// Halves the pad's windows around some places, down to `least` of the widest; whether any was left
+    /// to halve.
+    pub(super) fn narrow_pad(&mut self, places: &[f64], least: f64) -> bool {
+        self.pad.narrow(places, least)
+    }
+
+    /// Halves all windows around some places; whether any was left to halve.
+    pub(super) fn narrow(&mut self, places: &[f64]) -> bool {
+        let pad = self.pad.narrow(places, 0.0);
+        self.joints.narrow(places, 0.0) || pad
+    }
+}
+
+/// Shares of the widest window along a piece.
+struct Shares {
     length: f64,
     /// As asked for.
     asked: Vec<f64>,
@@ -30,32 +69,29 @@ pub(super) struct Windows {
     shares: Vec<f64>,
 }
 
-impl Windows {
-    /// The widest, along a piece of some length. \[m\]
-    pub(super) fn new(length: f64) -> Self {
+impl Shares {
+    fn new(length: f64) -> Self {
         let count = (length / GRID).ceil().max(1.0) as usize + 1;
         let whole = vec![1.0; count];
         Self { length, asked: whole.clone(), shares: whole }
     }
 
-    /// At a place of it. At its ends there is none, so that it ends where it did.
-    pub(super) fn at(&self, u: f64) -> Window {
+    /// The window at a place of which this is the widest. \[m\]
+    fn of(&self, width: f64, u: f64) -> f64 {
         let last = (self.shares.len() - 1) as f64;
         let place = (u / self.length * last).clamp(0.0, last);
         let k = (place as usize).min(self.shares.len().saturating_sub(2));
         let rest = place - k as f64;
         let share = self.shares[k] * (1.0 - rest) + self.shares[k + 1] * rest;
         let room = 2.0 * u.min(self.length - u).max(0.0);
-        let within = |width: f64| match share * width {
+        match share * width {
             0.0 => 0.0,
             _ if room == 0.0 => 0.0,
             wide => wide * room / (wide.powi(4) + room.powi(4)).powf(0.25),
-        };
-        Window { place: within(PLACE), posture: within(POSTURE) }
+        }
     }
 
-    /// Halves the windows around some places; whether any was left to halve.
-    pub(super) fn narrow(&mut self, places: &[f64]) -> bool {
+    fn narrow(&mut self, places: &[f64], least: f64) -> bool {
         let count = self.asked.len();
         let spacing = self.length / (count - 1) as f64;
         let index = |u: f64| ((u / spacing).round() as usize).min(count - 1);
@@ -65,8 +101,9 @@ impl Windows {
         let was = self.asked.clone();
         for &k in &indices {
             let share = was[k];
-            any |= share > 0.0;
-            self.asked[k] = if 0.5 * share < NARROWEST { 0.0 } else { 0.5 * share };
+            any |= share > least;
+            let half = if 0.5 * share < NARROWEST { 0.0 } else { 0.5 * share };
+            self.asked[k] = half.max(least).min(share);
         }
         let step = STEEPEST * spacing;
         for k in 1..count {
@@ -86,5 +123,26 @@ impl Windows {
             })
             .collect();
         any
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_swept_narrows_the_pads_windows_and_not_those_of_the_joints() {
+        let mut windows = Windows::new(1.0);
+        let before = windows.at(0.5);
+        while windows.narrow_pad(&[0.5], 0.25) {}
+        let after = windows.at(0.5);
+        assert!((after.place / before.place - 0.25).abs() < 0.1, "{before:?} {after:?}");
+        assert!(after.heading < 0.5 * before.heading);
+        assert_eq!(after.joints, before.joints);
+        while windows.narrow_pad(&[0.5], 0.0) {}
+        assert_eq!(windows.at(0.5).place, 0.0);
+        assert_eq!(windows.at(0.5).joints, before.joints);
+        while windows.narrow(&[0.5]) {}
+        assert_eq!(windows.at(0.5).joints, 0.0);
     }
 }

@@ -4,12 +4,12 @@ use nullsweep_robot::JointVector;
 use nullsweep_surface::Patch;
 
 use super::attempt::{Planning, Sequence, Visit};
-use crate::plan::{Plan, PlanKnot, SurfaceSample};
+use crate::plan::{Method, Plan, PlanKnot, SurfaceSample};
 use crate::timing;
 
 impl Planning<'_> {
     /// Joins the legs, unwraps continuous joints and sets the times.
-    pub(super) fn assemble(&self, patches: &[Patch], sequence: &Sequence) -> Plan {
+    pub(super) fn assemble(&self, method: Method, patches: &[Patch], sequence: &Sequence) -> Plan {
         let Self { robot, job, stance, scan, .. } = *self;
         let arm = self.cell.arm;
         let mut knots: Vec<PlanKnot> = Vec::new();
@@ -39,7 +39,7 @@ impl Planning<'_> {
         Plan {
             base: stance.base,
             base_height: stance.height,
-            method: job.method,
+            method,
             cost: job.cost,
             seed: job.seed,
             patches: patches.iter().map(|p| p.centre.into()).collect(),

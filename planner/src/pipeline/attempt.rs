@@ -41,8 +41,11 @@ pub(super) struct Planning<'a> {
 
 /// A plan with what it was made from.
 pub(super) struct Attempt {
+    pub(super) method: Method,
     pub(super) patches: Vec<Patch>,
-    visit: Vec<Option<Sample>>,
+    /// How many of them are places on strips.
+    pub(super) places: usize,
+    pub(super) visit: Vec<Option<Sample>>,
     pub(super) graph: Graph,
     pub(super) sequence: Sequence,
     pub(super) plan: Plan,
@@ -82,6 +85,7 @@ impl Planning<'_> {
     /// of `before`.
     pub(super) fn attempt(
         &self,
+        method: Method,
         patches: Vec<Patch>,
         visit: Vec<Option<Sample>>,
         before: Option<&Attempt>,
@@ -95,23 +99,49 @@ impl Planning<'_> {
         progress.stage("tour", None);
         let tool_pose = job.tool.on(cell.arm).pose(&self.start);
         let tour = clock.time("gtsp", || {
-            let order = match job.method {
+            let order = match method {
                 Method::Tsp => formulation::shortest,
-                Method::Curvature => formulation::smoothest,
+                // Where there are no strips, or patches are put over what they leave out.
+                Method::Curvature | Method::Raster => formulation::smoothest,
                 Method::Joint => return self.joint_tour(&graph, &patches, &tool_pose),
             };
             order(&graph, &patches, &job.tool, &tool_pose, &job.formulation, job.seed)
         })?;
-        progress.stage("layered graph and transfers", None);
+        self.attempted(method, patches, visit, graph, &tour, clock)
+    }
+
+    /// The attempt along a tour over the graph's patches.
+    pub(super) fn attempted(
+        &self,
+        method: Method,
+        patches: Vec<Patch>,
+        visit: Vec<Option<Sample>>,
+        graph: Graph,
+        tour: &[Stop],
+        clock: &mut Clock,
+    ) -> Result<Attempt, PipelineError> {
+        self.progress.stage("layered graph and transfers", None);
         let context =
             TourContext { planning: self, graph: &graph, patches: &patches, visit: &visit };
-        let sequence = clock.time("layered", || match job.cost {
-            CostKind::Effort => context.sequence(&Effort, &tour),
-            CostKind::Time => context.sequence(&TaskTime::new(&self.velocity), &tour),
+        let sequence = clock.time("layered", || match self.job.cost {
+            CostKind::Effort => context.sequence(&Effort, tour),
+            CostKind::Time => context.sequence(&TaskTime::new(&self.velocity), tour),
         })?;
-        let plan = self.assemble(&patches, &sequence);
+        let plan = self.assemble(method, &patches, &sequence);
         let left = clock.time("coverage", || self.left(&plan));
-        Ok(Attempt { patches, visit, graph, sequence, plan, left })
+        Ok(Attempt { method, patches, places: 0, visit, graph, sequence, plan, left })
+    }
+
+    /// Says which stops an attempt comes to in no way.
+    pub(super) fn tell_left_out(&self, attempt: &Attempt) {
+        let dropped = &attempt.sequence.dropped;
+        let names = match attempt.method {
+            Method::Raster => ["place", "places"],
+            Method::Tsp | Method::Curvature | Method::Joint => ["patch", "patches"],
+        };
+        if !dropped.is_empty() {
+            self.progress.note(&left_out(names, dropped, "no motion there was found"));
+        }
     }
 
     /// The points to sweep that the plan leaves out.
@@ -173,7 +203,7 @@ impl TourContext<'_> {
     /// The cheapest joint path through the tour's poses. A stop into which no motion is found is
     /// left out.
     fn sequence<C: Cost>(&self, cost: &C, tour: &[Stop]) -> Result<Sequence, PipelineError> {
-        let Planning { cell, job, start, progress, .. } = *self.planning;
+        let Planning { cell, job, start, .. } = *self.planning;
         let continuous = cell.arm.continuous();
         let values = redundancies(cell.arm.ik().redundancy_range(), job.ik_samples);
         let layers: Vec<Vec<Sample>> =
@@ -185,9 +215,6 @@ impl TourContext<'_> {
         let path = layered::shortest(cost, continuous, &start, &layers, &mover, &mut |layer| {
             dropped.push(stops[layer]);
         });
-        if !dropped.is_empty() {
-            progress.note(&left_out(["patch", "patches"], &dropped, "no motion there was found"));
-        }
         if path.layers.is_empty() {
             return Err(PipelineError::NoMotion { reachable: tour.len() });
         }

@@ -122,7 +122,7 @@ impl<'p, C: Cost> Completion<'p, C> {
 
     /// The plan of the sequence as it is now, and what it leaves out.
     fn renew(&self, attempt: &mut Attempt) {
-        attempt.plan = self.planning.assemble(&attempt.patches, &attempt.sequence);
+        attempt.plan = self.planning.assemble(attempt.method, &attempt.patches, &attempt.sequence);
         attempt.left = self.planning.left(&attempt.plan);
     }
 

@@ -24,6 +24,9 @@ pub struct Figures {
     pub reachable: usize,
     /// Patches put over what the others' sweep left out.
     pub fill_in_patches: usize,
+    /// Places of the pad on strips, in place of the patches.
+    #[serde(default)]
+    pub places: usize,
     /// Short ways beside a stop between two jumps, so that it sweeps and does not only touch.
     pub strokes: usize,
     /// Pairs of neighbouring patches.

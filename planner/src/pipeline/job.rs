@@ -25,8 +25,9 @@ pub struct Job {
     pub end: End,
     /// A plan that this one goes on from.
     pub after: Option<After>,
-    /// How the order is found.
-    pub method: Method,
+    /// How the order is found; `None`: by Curvature, Joint or Raster, whichever plan takes the least
+    /// time of those that sweep about as much as Curvature's.
+    pub method: Option<Method>,
     /// What is minimised.
     pub cost: CostKind,
     /// Values of the redundancy parameter at each tool pose, 1…; each gives a sample for every branch.
@@ -70,7 +71,7 @@ impl Job {
             start: None,
             end: End::default(),
             after: None,
-            method: Method::Curvature,
+            method: Some(Method::Curvature),
             cost: CostKind::Time,
             ik_samples: 100,
             v_max: None,

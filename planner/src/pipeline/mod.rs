@@ -2,6 +2,7 @@
 
 mod assemble;
 mod attempt;
+mod choice;
 mod clock;
 mod completion;
 mod elsewhere;
@@ -12,6 +13,8 @@ mod job;
 mod joint_order;
 mod left_out;
 mod other;
+mod pruned;
+mod rastered;
 mod run;
 mod setting;
 mod start;

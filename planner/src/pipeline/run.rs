@@ -6,6 +6,7 @@ use nullsweep_surface::{Patch, Scan, patches};
 use rayon::prelude::*;
 
 use super::attempt::{Attempt, Planning};
+use super::choice::{Made, made};
 use super::clock::Clock;
 use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
@@ -14,17 +15,16 @@ use super::job::{After, Job};
 use super::left_out::{Known, in_words, left_out};
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
-use super::swept::{leave_out_swept, points_of, swept_before};
+use super::swept::{points_of, swept_before};
 use crate::cost;
-use crate::fairing::{Keep, fair};
 use crate::motion::Memo;
-use crate::plan::{Plan, Profile};
+use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::roadmap::Graph;
 use crate::sweep::{Held, passes};
-use crate::timing::{self, Limits, Pace, Rest, paced};
+use crate::timing::Rest;
 use crate::verify::{Given, verify};
-use crate::workcell::{Bed, Sample, Scene, Workcell, reach};
+use crate::workcell::{Bed, Scene, Workcell, reach};
 
 /// A plan with all that led to it, in the root frame.
 pub struct Outcome {
@@ -107,10 +107,8 @@ pub fn run(
         progress,
         memo: Memo::new(job.seed),
     };
-    let best = search(&planning, patches, samples, &mut clock)?;
-    let Attempt { patches, graph, sequence, mut plan, .. } = best;
-    planning.leave(&mut plan);
-    let plan = moved(&planning, plan, rest, &mut clock);
+    let Made { attempt, plan } = made(&planning, patches, samples, rest.as_ref(), &mut clock)?;
+    let Attempt { patches, graph, sequence, places, .. } = attempt;
 
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
@@ -131,7 +129,8 @@ pub fn run(
         patches: found.len(),
         left_out,
         reachable: reachable.iter().filter(|r| **r).count(),
-        fill_in_patches: patches.len() - found.len() - strokes,
+        fill_in_patches: patches.len() - found.len() - strokes - places,
+        places,
         strokes,
         base: stance.base,
         base_height_m: stance.height,
@@ -149,42 +148,6 @@ pub fn run(
     Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
 }
 
-/// The plan as it is gone along: made smooth and timed as the job asks, after what comes to rest first.
-fn moved(of: &Planning<'_>, mut plan: Plan, rest: Option<Rest>, clock: &mut Clock) -> Plan {
-    let Planning { job, cell, progress, .. } = *of;
-    if job.smooth {
-        progress.stage("fairing", None);
-        let keep = Keep { scan: of.scan, points: of.to_sweep };
-        plan = clock.time("fairing", || fair(&plan, cell, of.bed, keep));
-        timing::set_times(&mut plan.knots, &of.velocity);
-    }
-    if job.profile.is_curved() {
-        progress.stage("timing", None);
-        let pace = pace(job, cell.arm, progress);
-        let limits = Limits::of(cell.arm, job.v_max);
-        plan = clock.time("timing", || paced(&plan, cell, &limits, &pace));
-        if let Some(rest) = rest {
-            plan = rest.then(plan);
-        }
-    }
-    plan
-}
-
-/// What the plan keeps to besides velocity and acceleration.
-fn pace(job: &Job, arm: &Arm, progress: &dyn Progress) -> Pace<'static> {
-    let known = job.jerk.is_some() || arm.limits().iter().all(|joint| joint.jerk.is_some());
-    if job.profile == Profile::Jerk && !known {
-        progress.note(&format!(
-            "the URDF has no jerk limits: each joint is taken to come to its full acceleration in \
-             {} s",
-            timing::DEFAULT_JERK_TIME
-        ));
-    }
-    let limited = job.profile == Profile::Jerk;
-    let jerk = limited.then(|| job.jerk.unwrap_or_else(|| timing::jerks(arm)));
-    Pace { stops: &[], jerk, tool_speed: job.tool_speed }
-}
-
 /// Where the arm begins; for a plan that joins another one in motion, after the way to rest on the
 /// other one's path.
 fn begin(
@@ -200,32 +163,4 @@ fn begin(
     let rest = rest_before(job, arm);
     let at_rest = rest.as_ref().and_then(|rest| rest.knots.last()).map(|knot| knot.q);
     Ok((at_rest.unwrap_or(start.q), rest))
-}
-
-/// The best of some attempts, each with patches over what the one before has left out, and side
-/// trips to what remains.
-fn search(
-    planning: &Planning<'_>,
-    patches: Vec<Patch>,
-    mut visit: Vec<Option<Sample>>,
-    clock: &mut Clock,
-) -> Result<Attempt, PipelineError> {
-    let job = planning.job;
-    if let Some(after) = job.after.as_ref().filter(|after| !after.again) {
-        leave_out_swept(&mut visit, &patches, planning.already);
-        if !visit.iter().any(Option::is_some) {
-            return Err(PipelineError::NothingLeft { knot: after.knot });
-        }
-    }
-    let mut best = planning.attempt(patches, visit, None, clock)?;
-    for _ in 0..job.refinements {
-        let Some((patches, visit)) = planning.refine(&best, clock) else { break };
-        let next = planning.attempt(patches, visit, Some(&best), clock)?;
-        if next.swept_points() <= best.swept_points() {
-            break;
-        }
-        best = next;
-    }
-    planning.complete(&mut best, clock);
-    Ok(best)
 }

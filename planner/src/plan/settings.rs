@@ -24,6 +24,8 @@ pub enum Method {
     /// A node for each patch, incident edge and sample of the inverse kinematics; the cost of the
     /// joint motion is weighed (Eq. 1–3) (the paper's Joint-GTSP).
     Joint,
+    /// Strips side by side over each piece of the surface that bends little, the pad across them.
+    Raster,
 }
 
 /// What a plan minimises.

@@ -98,6 +98,33 @@ pub fn build(
     Graph::of(tried.into_iter().flatten().collect(), reached, apart)
 }
 
+/// A pair of patches, and the pad's heading at each of them. \[rad\]
+pub type Step = [(usize, f64); 2];
+
+/// The graph of given steps, patches joined wherever a surface line leads and some branch can be
+/// followed along it at one redundancy value, the pad at these headings.
+#[must_use]
+pub fn of_steps(
+    cell: Workcell<'_>,
+    nodes: Nodes<'_>,
+    config: &GraphConfig,
+    steps: &[Step],
+) -> Graph {
+    let Nodes { bed, patches, reached } = nodes;
+    let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), config.edge_samples));
+    let tried: Vec<Option<Edge>> = steps
+        .par_iter()
+        .map(|&[(a, from), (b, to)]| {
+            let edge = Edge::between(bed, patches, a, b, config, cell.tool.width)?;
+            let mut turned = TurnedEdge::at(cell, patches, edge, [from, to]);
+            turned.is_followed(cell, &values).then_some(turned.edge)
+        })
+        .collect();
+    let pairs = steps.iter().map(|[(a, _), (b, _)]| (*a.min(b), *a.max(b)));
+    let apart = pairs.zip(&tried).filter(|(_, edge)| edge.is_none()).map(|(p, _)| p).collect();
+    Graph::of(tried.into_iter().flatten().collect(), reached, apart)
+}
+
 /// The edge between two patches, if some branch can be followed along it.
 fn join(
     cell: Workcell<'_>,
@@ -209,6 +236,11 @@ impl TurnedEdge {
     fn new(cell: Workcell<'_>, patches: &[Patch], edge: &Edge, turn: f64) -> Self {
         let edge = Edge { turn: turn.to_radians(), ..edge.clone() };
         let headings = [edge.heading_a + edge.turn, edge.heading_b + edge.turn];
+        Self::at(cell, patches, edge, headings)
+    }
+
+    /// With the pad's heading at both ends. \[rad\]
+    fn at(cell: Workcell<'_>, patches: &[Patch], edge: Edge, headings: [f64; 2]) -> Self {
         let stand_off = cell.tool.stand_off;
         let path = ToolPath::along(&edge, false, headings[0], headings[1], stand_off);
         let end = |patch: usize, heading: f64| {

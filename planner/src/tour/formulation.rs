@@ -50,6 +50,9 @@ pub enum FormulationError {
     /// The solver cannot solve it.
     #[error("the order's search: {0}")]
     Solve(#[from] SolveError),
+    /// A raster was asked for where the patches are given.
+    #[error("a raster is no order of patches: it has places of its own")]
+    NoOrder,
 }
 
 /// Price of going between patches that no edge joins (Eq. 3's h): more than any whole tour. \[m\]

@@ -2,3 +2,4 @@
 
 pub mod formulation;
 pub mod joint;
+pub mod raster;
