@@ -1,6 +1,6 @@
 //! `planner plan`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::Context;
@@ -32,6 +32,7 @@ use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
 use crate::site::SiteArgs;
+use crate::stops::{self, StopsArgs};
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -46,7 +47,7 @@ pub(super) struct PlanArgs {
     scene: SceneArgs,
 
     #[command(flatten)]
-    robot: RobotArgs,
+    pub(super) robot: RobotArgs,
     /// The tool, a TOML file; without it a sponge of 0.10 × 0.07 m.
     #[arg(long, value_name = "FILE")]
     tool: Option<PathBuf>,
@@ -201,11 +202,16 @@ pub(super) struct PlanCommandArgs {
     #[command(flatten)]
     pub(super) plan: PlanArgs,
     #[command(flatten)]
+    pub(super) stops: StopsArgs,
+    #[command(flatten)]
     pub(super) site: SiteArgs,
 }
 
 pub(super) fn run(command: &PlanCommandArgs) -> anyhow::Result<u8> {
     let args = &command.plan;
+    if command.stops.is_asked() {
+        return stops::run(&command.stops, args, command.site.site());
+    }
     let after = match &args.after {
         None => None,
         Some(KnotOf { plan, knot }) => {
@@ -259,6 +265,27 @@ impl PlanArgs {
         let outcome = pipeline::run(&robot, &scene, &job, bars);
         bars.clear();
         Ok(Made { robot, scene, collision: job.collision, outcome: outcome? })
+    }
+
+    /// What is to be planned.
+    pub(super) fn job(
+        &self,
+        robot: &Robot,
+        site: Site<'_>,
+        after: Option<After>,
+        bars: &Bars,
+    ) -> anyhow::Result<Job> {
+        job(self, robot, site, after, bars)
+    }
+
+    /// Where the plan is written.
+    pub(super) fn out(&self) -> &Path {
+        &self.out
+    }
+
+    /// Where the figures are written.
+    pub(super) fn json(&self) -> Option<&Path> {
+        self.json.as_deref()
     }
 
     /// What is there, in the floor frame.
@@ -379,6 +406,7 @@ fn job(
             EndArg::At(end) => End::At(posture(end, "--end")?),
         },
         after,
+        spared: Vec::new(),
         method: args.method.into(),
         cost: args.cost.into(),
         ik_samples: args.ik_samples as usize,

@@ -6,6 +6,9 @@ use crate::motion::{jump, retract};
 use crate::plan::{LIFT, Plan, PlanKnot};
 use crate::timing;
 
+/// How often a way to where the plan is to end is looked for, each time with other samples.
+const TRIES: u64 = 4;
+
 impl Planning<'_> {
     /// Puts the way from the last stop to where the plan is to end behind a plan with bang-bang
     /// velocity. Where there is none the plan ends nearer to its last stop, which is told.
@@ -17,7 +20,10 @@ impl Planning<'_> {
             End::Start => Some(self.start),
             End::At(q) => Some(q),
         };
-        let way = goal.and_then(|goal| jump(self.cell, &last, &goal, self.job.seed));
+        let tried = |k: u64| {
+            goal.and_then(|goal| jump(self.cell, &last, &goal, self.job.seed.wrapping_add(k)))
+        };
+        let way = (0..TRIES).find_map(tried);
         if goal.is_some() && way.is_none() {
             self.progress.note("no way free of collision to where the plan is to end was found");
         }

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use nullsweep_ipc_types::{MAX_HELD_JOINTS, MAX_KNOTS};
 
+use super::program::PROGRAM_FORMAT;
+
 /// The version of the plan file that this build reads and writes.
 pub const FORMAT: u32 = 1;
 
@@ -33,6 +35,22 @@ pub enum PlanError {
         path: PathBuf,
         /// Its version.
         found: u32,
+    },
+    /// A program that was written by another version.
+    #[error("{path}: program format {found}, this build reads {PROGRAM_FORMAT}: plan it again")]
+    ProgramFormat {
+        /// Which file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// A plan of a program was made for another place.
+    #[error("plan {work} of stop {stop} was made for another place or other held joints")]
+    OtherStop {
+        /// Which stop, from 1.
+        stop: usize,
+        /// Which plan of it, from 1.
+        work: usize,
     },
     /// It never passed the last gate.
     #[error("the plan was not verified")]
