@@ -10,7 +10,9 @@ use pyo3::types::{PyBool, PyDict, PyString};
 use crate::errors::UsageError;
 
 /// Flags of a command alone: what it writes is returned here, and what it reads is given otherwise.
-const ELSEWHERE: [&str; 7] = ["out", "json", "report", "cell", "continue", "help", "version"];
+const ELSEWHERE: [&str; 11] = [
+    "out", "json", "report", "cell", "continue", "help", "version", "stops", "arms", "jobs", "job",
+];
 
 /// Each keyword as a flag; `None` and `False` say nothing, `True` is a flag without a value, of a
 /// dictionary each item is NAME=VALUE, numbers of a sequence stand apart by commas, and a sequence of

@@ -70,7 +70,7 @@ struct Line<A: Args> {
 }
 
 /// Reads words as a command's arguments, a cell file's values where they say nothing.
-fn parse<A: Args>(words: &[OsString]) -> anyhow::Result<A> {
+pub(super) fn parse<A: Args>(words: &[OsString]) -> anyhow::Result<A> {
     let line = std::iter::once("planner".into()).chain(words.iter().cloned());
     let parsed = nullsweep_cell::parse::<Line<A>>(line, &[], &[]);
     let parsed = parsed.map_err(|error| {
@@ -92,6 +92,11 @@ pub fn plan(
     listener: Listener,
 ) -> anyhow::Result<Planned> {
     let args: PlanCommandArgs = parse(words)?;
+    if args.stops.is_asked() {
+        let why =
+            "--stops makes a program of several plans: the command has it, a function has not";
+        return Err(Usage(why.into()).into());
+    }
     let made = args.plan.work(args.site.site(), after, &Bars::of(listener))?;
     let made = Arc::new(made);
     let (outcome, page) = (&made.outcome, Arc::clone(&made));

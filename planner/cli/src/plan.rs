@@ -32,7 +32,7 @@ use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
 use crate::site::SiteArgs;
-use crate::stops::{self, StopsArgs};
+use crate::stops::StopsArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -209,8 +209,8 @@ pub(super) struct PlanCommandArgs {
 
 pub(super) fn run(command: &PlanCommandArgs) -> anyhow::Result<u8> {
     let args = &command.plan;
-    if command.stops.is_asked() {
-        return stops::run(&command.stops, args, command.site.site());
+    if let Some(done) = command.stops.run(args, command.site.site()) {
+        return done;
     }
     let after = match &args.after {
         None => None,
@@ -233,6 +233,14 @@ pub(super) fn make(
     }
     let made = args.work(site, after, &Bars::new())?;
     Ok((finish(args, &made)?, made.outcome.plan))
+}
+
+/// What is written, and where.
+#[derive(Clone, Copy)]
+pub(super) struct Files<'a> {
+    pub(super) out: &'a Path,
+    pub(super) json: Option<&'a Path>,
+    pub(super) report: Option<&'a Path>,
 }
 
 /// What was made, and of what.
@@ -278,14 +286,15 @@ impl PlanArgs {
         job(self, robot, site, after, bars)
     }
 
-    /// Where the plan is written.
-    pub(super) fn out(&self) -> &Path {
-        &self.out
+    /// What is written, and where.
+    pub(super) fn files(&self) -> Files<'_> {
+        let [json, report] = [&self.json, &self.report].map(Option::as_deref);
+        Files { out: &self.out, json, report }
     }
 
-    /// Where the figures are written.
-    pub(super) fn json(&self) -> Option<&Path> {
-        self.json.as_deref()
+    /// Held joints that are given.
+    pub(super) fn held(&self) -> Vec<(String, f64)> {
+        held(self)
     }
 
     /// What is there, in the floor frame.
@@ -337,7 +346,7 @@ fn finish(args: &PlanArgs, made: &Made) -> anyhow::Result<u8> {
     if let Some(path) = &args.json {
         write_json(figures, path)?;
     }
-    let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
+    let to_stdout = args.json.as_deref() == Some(Path::new("-"));
     if !to_stdout {
         say!("{}", table(figures));
     }

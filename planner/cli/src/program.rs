@@ -1,6 +1,5 @@
 //! What a program holds, for people and for machines.
 
-use comfy_table::Table;
 use nullsweep_planner::plan::{Program, ProgramStop, Totals, Work};
 use nullsweep_planner::workcell::stance::told;
 use serde::Serialize;
@@ -65,14 +64,18 @@ fn stop_of(stop: &ProgramStop) -> StopSummary<'_> {
     }
 }
 
-/// The stops, and what they come to.
-pub(super) fn table(program: &Program) -> String {
-    let mut stops = sheet(["stop", "base", "held", "drive", "arm", "adds", "off place", "takes"]);
+/// What [`stop_rows`] tell.
+pub(super) const COLUMNS: [&str; 8] =
+    ["stop", "base", "held", "drive", "arm", "adds", "off place", "takes"];
+
+/// The plans of all stops, for people.
+pub(super) fn stop_rows(program: &Program) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
     for (s, stop) in program.stops.iter().enumerate() {
         for (w, work) in stop.works.iter().enumerate() {
             let once = |text: String| if w == 0 { text } else { String::new() };
             let held: Vec<String> = stop.held.iter().map(|(n, v)| format!("{n} {v}")).collect();
-            stops.add_row([
+            rows.push(vec![
                 once((s + 1).to_string()),
                 once(told(&stop.base)),
                 once(held.join(", ")),
@@ -84,14 +87,21 @@ pub(super) fn table(program: &Program) -> String {
             ]);
         }
     }
-    format!("{stops}\n{}", totals(&program.totals))
+    rows
 }
 
-fn totals(t: &Totals) -> Table {
-    let mut table = sheet(["figure", "value"]);
-    let mut row = |name: &str, value: String| {
-        table.add_row([name.to_owned(), value]);
-    };
+/// The stops, and what they come to.
+pub(super) fn table(program: &Program) -> String {
+    let (mut stops, mut totals) = (sheet(COLUMNS), sheet(["figure", "value"]));
+    stops.add_rows(stop_rows(program));
+    totals.add_rows(totals_rows(&program.totals));
+    format!("{stops}\n{totals}")
+}
+
+/// What the stops come to together, for people.
+pub(super) fn totals_rows(t: &Totals) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
+    let mut row = |name: &str, value: String| rows.push(vec![name.to_owned(), value]);
     row("swept of all points", format!("{} of {}", percent(t.coverage_all), t.points));
     row("in reach of any stop that was looked at", percent(t.coverage_of_any_stops));
     row("places on the floor, looked at", format!("{}, {}", t.places, t.looked));
@@ -107,5 +117,5 @@ fn totals(t: &Totals) -> Table {
         let share = percent(left.share);
         row(&format!("  {}", left.why), format!("{} patches, {share}", left.patches));
     }
-    table
+    rows
 }

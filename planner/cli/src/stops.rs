@@ -1,34 +1,42 @@
 //! `planner plan --stops`: the whole object from several places.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
 use nullsweep_planner::link::Site;
-use nullsweep_planner::pipeline::StanceChoice;
 use nullsweep_planner::plan::Program;
-use nullsweep_planner::progress::Progress;
 use nullsweep_planner::stops::{self, Setup};
 use nullsweep_planner::workcell::Scene;
+use nullsweep_report as report;
 use nullsweep_robot::{ArmSpec, Robot, Side};
 
 use crate::bars::Bars;
 use crate::exit::{OK, Usage};
+use crate::jobs;
 use crate::json::write_json;
 use crate::output::{say, writable};
-use crate::plan::PlanArgs;
-use crate::program::table;
+use crate::picture::of_program as page;
+use crate::plan::{Files, PlanArgs};
+use crate::program::{figures, table};
 
 #[derive(Debug, Args)]
 pub(super) struct StopsArgs {
     /// Sweep the whole object from several places of the robot, and write a program of a plan for each
     /// arm at each: as many stops as are worth it (auto), or at most N.
-    #[arg(long, value_name = "auto|N", conflicts_with_all = ["base", "after", "end", "report"])]
+    #[arg(long, value_name = "auto|N", conflicts_with_all = ["base", "after", "end"])]
     stops: Option<Most>,
     /// With --stops: the arms that work, one after the other at a stop: `left,right`, or BASE,TIP, which
     /// may be repeated. Without it both arms of the PR2, else the arm.
     #[arg(long, value_name = "ARMS", requires = "stops")]
     arms: Vec<Arms>,
+    /// With --stops: plan nothing yet, but write a job for each plan of the first stops into this
+    /// folder; `planner plan --job` does one, `planner join` puts the program together.
+    #[arg(long, value_name = "FOLDER", requires = "stops")]
+    jobs: Option<PathBuf>,
+    /// Do one such job: its plan goes beside it. Run it in the folder in which the jobs were made.
+    #[arg(long, value_name = "FILE", exclusive = true)]
+    job: Option<PathBuf>,
 }
 
 /// How many stops.
@@ -67,9 +75,21 @@ impl FromStr for Arms {
 }
 
 impl StopsArgs {
+    /// Does what is asked for, if that is several stops or a job of some.
+    pub(super) fn run(&self, plan: &PlanArgs, site: Site<'_>) -> Option<anyhow::Result<u8>> {
+        if let Some(job) = &self.job {
+            return Some(jobs::work(job));
+        }
+        self.stops?;
+        Some(match &self.jobs {
+            Some(folder) => jobs::write(self, plan, site, folder),
+            None => run(self, plan, site),
+        })
+    }
+
     /// Whether several stops are asked for.
     pub(super) fn is_asked(&self) -> bool {
-        self.stops.is_some()
+        self.stops.is_some() || self.job.is_some()
     }
 
     /// The arms that work.
@@ -101,10 +121,9 @@ impl StopsArgs {
             let why = "--start is one arm's: with several arms each begins where it is tucked";
             return Err(Usage(why.into()).into());
         }
-        let (held, lift) = match &job.stance {
-            StanceChoice::Search(search) => (search.held.clone(), search.lift.clone()),
-            _ => (Vec::new(), None),
-        };
+        let held = plan.held();
+        let lift = stops::lifts(robot, &robot.arm(&job.arm)?, &job)
+            .filter(|(lift, _)| held.iter().all(|(name, _)| name != lift));
         let most = match self.stops {
             Some(Most::Of(n)) => Some(n),
             _ => None,
@@ -114,34 +133,58 @@ impl StopsArgs {
     }
 }
 
+/// What stops are looked for in.
+pub(super) struct Ground {
+    pub(super) robot: Robot,
+    pub(super) setup: Setup,
+    pub(super) scene: Scene,
+}
+
+impl StopsArgs {
+    /// What stops are looked for in.
+    pub(super) fn ground(
+        &self,
+        plan: &PlanArgs,
+        site: Site<'_>,
+        bars: &Bars,
+    ) -> anyhow::Result<Ground> {
+        let robot = plan.robot.robot()?;
+        plan.robot.tell(&robot, bars)?;
+        let setup = self.setup(plan, &robot, site, bars)?;
+        let scene = plan.scene(bars)?;
+        Ok(Ground { robot, setup, scene })
+    }
+}
+
 /// Makes the program and writes what was asked for.
-pub(super) fn run(args: &StopsArgs, plan: &PlanArgs, site: Site<'_>) -> anyhow::Result<u8> {
-    for out in [Some(plan.out()), plan.json()].into_iter().flatten() {
+fn run(args: &StopsArgs, plan: &PlanArgs, site: Site<'_>) -> anyhow::Result<u8> {
+    let files = plan.files();
+    for out in [Some(files.out), files.json, files.report].into_iter().flatten() {
         writable(out)?;
     }
     let bars = Bars::new();
-    let robot = plan.robot.robot()?;
-    plan.robot.tell(&robot, &bars)?;
-    let setup = args.setup(plan, &robot, site, &bars)?;
-    let scene = plan.scene(&bars)?;
-    let program = make(&robot, &setup, &scene, &bars);
+    let ground = args.ground(plan, site, &bars)?;
+    let program = stops::run(&ground.robot, &ground.setup, &ground.scene, &bars);
     bars.clear();
-    finish(&program?, plan.out(), plan.json())
-}
-
-fn make(robot: &Robot, setup: &Setup, scene: &Scene, bars: &Bars) -> anyhow::Result<Program> {
-    Ok(stops::run(robot, setup, scene, bars)?)
+    finish(&program?, files, &ground)
 }
 
 /// Writes the program and prints what it comes to.
-pub(super) fn finish(program: &Program, out: &Path, json: Option<&Path>) -> anyhow::Result<u8> {
-    program.write(out)?;
-    if let Some(path) = json {
-        write_json(&crate::program::figures(program), path)?;
+pub(super) fn finish(program: &Program, files: Files<'_>, ground: &Ground) -> anyhow::Result<u8> {
+    program.write(files.out)?;
+    if let Some(path) = files.report {
+        let Ground { robot, setup, scene } = ground;
+        report::write(path, &page(program, robot, &setup.job.collision, Some(scene))?)?;
     }
-    if json != Some(Path::new("-")) {
+    if let Some(path) = files.json {
+        write_json(&figures(program), path)?;
+    }
+    if files.json != Some(Path::new("-")) {
         say!("{}", table(program));
-        say!("program: {}", out.display());
+        say!("program: {}", files.out.display());
+        if let Some(path) = files.report {
+            say!("report: {}", path.display());
+        }
     }
     Ok(OK)
 }

@@ -21,6 +21,8 @@ pub struct Program {
     pub program: u32,
     /// The robot's name in its URDF.
     pub robot: String,
+    /// How far around a stop's base its plans know what is there: more than the robot reaches. \[m\]
+    pub near_m: f64,
     /// The stops, in the order of the drive.
     pub stops: Vec<ProgramStop>,
     /// What they come to together.
@@ -189,7 +191,7 @@ impl Program {
                 .ok()
         };
         let stops: Vec<_> = self.stops.iter().map(stop).collect();
-        Seal::new(&[], &(self.program, &self.robot, stops, &self.totals))
+        Seal::new(&[], &(self.program, &self.robot, self.near_m, stops, &self.totals))
     }
 
     /// Every plan with the number of its stop, from 0.

@@ -144,7 +144,7 @@ fn bound(of: &Problem, known: f64) -> f64 {
         taken.truncate(of.most);
         let left: f64 = of.weights.iter().zip(&price).map(|(w, u)| w - u).sum();
         let dual = left + taken.iter().map(|(w, _)| w).sum::<f64>();
-        if dual < best - 1e-6 * best.abs() {
+        if best.is_infinite() || dual < best - 1e-6 * best.abs() {
             (best, since) = (dual, 0);
         } else {
             since += 1;

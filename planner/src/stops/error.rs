@@ -17,6 +17,9 @@ pub enum StopsError {
     /// A plan cannot be made, for a reason that no other stop mends.
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
+    /// What was begun is of another scene.
+    #[error("the jobs were made for another scan, or for other patches of it")]
+    OtherScene,
     /// From nowhere anything is reached.
     #[error(
         "none of the {patches} patches is reached from any of {looked} places on the floor that were looked at, of {places} from which the arms are long enough; the tucked posture must be free there too"

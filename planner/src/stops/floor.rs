@@ -11,14 +11,12 @@ use super::setup::{Limb, Setup};
 use crate::workcell::stance::{OUTLINE, body_boxes, in_the_way};
 use crate::workcell::{Scene, Stance, contact_pose, direction, redundancies};
 
-/// A place whose body is clear of what is there, and the patches that each arm may reach from it.
+/// A place whose body is clear of what is there, and what may be reached from it.
 pub(super) struct Place {
     pub(super) stance: Stance,
-    /// For each arm patches for which it has joint vectors within its limits, ascending; collisions are
-    /// not looked at.
-    pub(super) promised: Vec<Vec<u32>>,
-    /// Those of any arm.
-    pub(super) all: Vec<u32>,
+    /// Patches for which some arm has joint vectors within its limits, ascending; collisions are not
+    /// looked at.
+    pub(super) promised: Vec<u32>,
 }
 
 /// Step of the places on the floor. \[m\]
@@ -89,9 +87,9 @@ pub(super) fn places(
                     let promise =
                         |arm: &Raised| promised(arm, &here, &centres, &contacts, &from_floor);
                     let promised: Vec<Vec<u32>> = figure.arms.iter().map(promise).collect();
-                    let all = union(&promised);
-                    if !all.is_empty() {
-                        places.push(Place { stance, promised, all });
+                    let promised = union(&promised);
+                    if !promised.is_empty() {
+                        places.push(Place { stance, promised });
                     }
                 }
             }

@@ -21,6 +21,18 @@ pub(super) struct Ground<'a> {
 }
 
 impl Ground<'_> {
+    /// For each arm the patches that it is long enough for.
+    pub(super) fn near(&self, stance: &Stance) -> Result<Vec<Vec<u32>>, StopsError> {
+        let to_root = stance.pose().inverse();
+        let of = |limb: &Limb| {
+            let pivot = self.setup.pivot(self.robot, &stance.bind(&limb.arm)?);
+            let apart =
+                |patch: &u32| (to_root * self.patches[*patch as usize].centre - pivot).norm();
+            Ok((0..self.patches.len() as u32).filter(|p| apart(p) <= limb.reach).collect())
+        };
+        self.limbs.iter().map(of).collect()
+    }
+
     /// For each arm which of some patches it reaches; `None` where the robot cannot stand there with its
     /// arms tucked.
     pub(super) fn look(

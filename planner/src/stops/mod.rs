@@ -21,7 +21,7 @@ mod unswept;
 
 pub use choice::Stop;
 pub use error::StopsError;
-pub use rounds::{Rounds, run};
+pub use rounds::{Rounds, State, run};
 pub use setup::{Setup, lifts};
 pub use share::{Share, Worked, work};
 pub use survey::{Site, Survey, survey};

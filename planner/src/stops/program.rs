@@ -33,7 +33,7 @@ pub(super) fn assemble(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Progr
     for (&stop, drive_m) in order.iter().zip(&drives) {
         let stance = &made[stop];
         let mut works = Vec::new();
-        for (one, plan) in plans(&of.worked, stance) {
+        for (one, plan) in plans(&of.state.worked, stance) {
             let new = one.swept.iter().filter(|&&point| !swept[point as usize]).count();
             one.swept.iter().for_each(|&point| swept[point as usize] = true);
             works.push(Work {
@@ -46,7 +46,7 @@ pub(super) fn assemble(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Progr
         let Stance { base, height, held } = stance.clone();
         stops.push(ProgramStop { base, base_height: height, held, drive_m: *drive_m, works });
     }
-    let union = of.survey.union(of.patches.len());
+    let union = of.state.survey.union(of.patches.len());
     let mut any = vec![false; points];
     for (patch, _) in of.patches.iter().zip(union).filter(|(_, reached)| *reached) {
         patch.points.iter().for_each(|&point| any[point as usize] = true);
@@ -57,9 +57,9 @@ pub(super) fn assemble(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Progr
         points,
         coverage_all: share(&swept),
         coverage_of_any_stops: share(&any),
-        places: of.survey.places,
-        looked: of.survey.looked,
-        choice_gap: of.gap,
+        places: of.state.survey.places,
+        looked: of.state.survey.looked,
+        choice_gap: of.state.gap,
         task_time_s: durations.map(|work| work.plan.duration()).sum(),
         drive_m: drives.iter().sum(),
         off_m: off.along,
@@ -67,7 +67,8 @@ pub(super) fn assemble(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Progr
         unswept: unswept(of)?,
     };
     let robot = of.robot.name().into();
-    Ok(Program { program: PROGRAM_FORMAT, robot, stops, totals, seal: None }.sealed())
+    let near_m = ground.around;
+    Ok(Program { program: PROGRAM_FORMAT, robot, near_m, stops, totals, seal: None }.sealed())
 }
 
 /// What was done at a stop.

@@ -4,6 +4,7 @@
 use nullsweep_robot::Robot;
 use nullsweep_surface::Patch;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::choice::{Open, Stop, choose};
 use super::error::StopsError;
@@ -20,20 +21,28 @@ use crate::workcell::{Scene, Stance};
 /// Times that stops are chosen: what a plan leaves out may be another one's.
 const ROUNDS: usize = 3;
 
-/// What is known and done so far; scene and patches in the floor frame.
+/// What is known and done so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// What is reached from where.
+    pub survey: Survey,
+    /// What was done, round after round.
+    pub worked: Vec<Worked>,
+    /// How far the first choice of stops can be from the best, as a share of all points.
+    pub gap: f64,
+    /// Times that stops were chosen.
+    pub rounds: usize,
+}
+
+/// The way from a survey to a program; scene and patches in the floor frame.
 pub struct Rounds<'a> {
     pub(super) robot: &'a Robot,
     pub(super) setup: &'a Setup,
     pub(super) scene: &'a Scene,
     pub(super) patches: Vec<Patch>,
-    pub(super) survey: Survey,
-    /// What was done, round after round.
-    pub(super) worked: Vec<Worked>,
+    pub(super) state: State,
     /// Which points of the scene are swept.
     pub(super) swept: Vec<bool>,
-    /// How far the first choice of stops can be from the best, as a share of all points.
-    pub(super) gap: f64,
-    rounds: usize,
 }
 
 /// Chooses stops and makes their plans, round after round, and puts the program together.
@@ -77,39 +86,41 @@ impl<'a> Rounds<'a> {
         progress.stage("patches", None);
         let patches = patches_of(scene, &setup.job)?;
         let survey = survey(robot, setup, scene, &patches, progress)?;
-        Ok(Self::surveyed(robot, setup, scene, patches, survey))
+        let swept = vec![false; scene.surface.points.len()];
+        let state = State { survey, worked: Vec::new(), gap: 0.0, rounds: 0 };
+        Ok(Self { robot, setup, scene, patches, state, swept })
     }
 
-    /// With what was surveyed before of the same scene.
+    /// Goes on from where another process was, of the same scene.
     ///
     /// # Errors
-    /// See [`StopsError`].
+    /// [`StopsError::OtherScene`], or no patches.
     pub fn resume(
         robot: &'a Robot,
         setup: &'a Setup,
         scene: &'a Scene,
-        survey: Survey,
+        state: State,
     ) -> Result<Self, StopsError> {
         let patches = patches_of(scene, &setup.job)?;
-        Ok(Self::surveyed(robot, setup, scene, patches, survey))
-    }
-
-    fn surveyed(
-        robot: &'a Robot,
-        setup: &'a Setup,
-        scene: &'a Scene,
-        patches: Vec<Patch>,
-        survey: Survey,
-    ) -> Self {
         let swept = vec![false; scene.surface.points.len()];
-        let worked = Vec::new();
-        Self { robot, setup, scene, patches, survey, worked, swept, gap: 0.0, rounds: 0 }
+        let reached = state.survey.sites.iter().flat_map(|site| site.reached.iter().flatten());
+        let points = state.worked.iter().flat_map(|one| &one.swept);
+        let is_other = reached.max().is_some_and(|&patch| patch as usize >= patches.len())
+            || points.max().is_some_and(|&point| point as usize >= swept.len());
+        if is_other {
+            return Err(StopsError::OtherScene);
+        }
+        let worked = state.worked.clone();
+        let state = State { worked: Vec::new(), ..state };
+        let mut rounds = Self { robot, setup, scene, patches, state, swept };
+        rounds.add(worked);
+        Ok(rounds)
     }
 
-    /// What was surveyed.
+    /// What is known and done so far.
     #[must_use]
-    pub fn survey(&self) -> &Survey {
-        &self.survey
+    pub fn state(&self) -> &State {
+        &self.state
     }
 
     /// Which points of the scene are swept so far.
@@ -131,7 +142,7 @@ impl<'a> Rounds<'a> {
     /// # Errors
     /// See [`StopsError`].
     pub fn next(&mut self, progress: &dyn Progress) -> Result<Option<Vec<Stop>>, StopsError> {
-        if self.rounds == ROUNDS {
+        if self.state.rounds == ROUNDS {
             return Ok(None);
         }
         progress.stage("stops", None);
@@ -166,14 +177,14 @@ impl<'a> Rounds<'a> {
                 list.push(stop.stance.clone());
             }
             if !fell.is_empty() {
-                self.survey.sites.retain(|site| !fell.contains(&site.stance));
+                self.state.survey.sites.retain(|site| !fell.contains(&site.stance));
                 continue;
             }
-            if self.rounds == 0 {
+            if self.state.rounds == 0 {
                 let points = self.swept.len().max(1) as f64;
-                self.gap = (choice.cover.bound - choice.cover.value) / points;
+                self.state.gap = (choice.cover.bound - choice.cover.value) / points;
             }
-            self.rounds += 1;
+            self.state.rounds += 1;
             return Ok(Some(choice.stops).filter(|stops| !stops.is_empty()));
         }
     }
@@ -183,7 +194,7 @@ impl<'a> Rounds<'a> {
         for point in worked.iter().flat_map(|one| &one.swept) {
             self.swept[*point as usize] = true;
         }
-        self.worked.extend(worked);
+        self.state.worked.extend(worked);
     }
 
     /// The program of all that was done.
@@ -197,7 +208,7 @@ impl<'a> Rounds<'a> {
     /// The stops that have a plan, in the order in which they were chosen.
     pub(super) fn made(&self) -> Vec<Stance> {
         let mut made: Vec<Stance> = Vec::new();
-        for one in self.worked.iter().filter(|one| one.plan.is_ok()) {
+        for one in self.state.worked.iter().filter(|one| one.plan.is_ok()) {
             if !made.contains(&one.share.stance) {
                 made.push(one.share.stance.clone());
             }
@@ -211,7 +222,8 @@ impl<'a> Rounds<'a> {
         let done: Vec<bool> = self.patches.iter().map(|p| is_swept(p, &self.swept)).collect();
         let tried = |site: &Site, arm: usize, patch: &u32| {
             let same = |one: &&Worked| one.share.arm == arm && one.share.stance == site.stance;
-            self.worked
+            self.state
+                .worked
                 .iter()
                 .filter(same)
                 .any(|one| one.share.patches.binary_search(patch).is_ok())
@@ -224,6 +236,6 @@ impl<'a> Rounds<'a> {
             let reached = site.reached.iter().enumerate().map(of).collect();
             Site { stance: site.stance.clone(), reached }
         };
-        self.survey.sites.iter().map(open).collect()
+        self.state.survey.sites.iter().map(open).collect()
     }
 }

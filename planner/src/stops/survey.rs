@@ -57,10 +57,12 @@ impl Survey {
 /// Places that are looked at side by side before the next are picked.
 const SIDE_BY_SIDE: usize = 12;
 /// Places that are looked at: for each patch so many shares of one, but no fewer and no more than these.
-const LOOKS_EACH: f64 = 0.8;
-const LOOKS: [usize; 2] = [60, 4000];
-/// What another place that reaches a patch is worth beside those that do.
+const LOOKS_EACH: f64 = 1.2;
+const LOOKS: [usize; 2] = [100, 4000];
+/// What another place that reaches a patch is worth beside one that does, and beside one that promised
+/// it in vain.
 const AGAIN: f64 = 0.5;
+const IN_VAIN: f64 = 0.85;
 
 /// Looks at places, each time at those that promise most of what fewest places reach; scene and patches
 /// in the floor frame.
@@ -83,27 +85,32 @@ pub fn survey(
     let ground = Ground { robot, setup, limbs, scene: &sketch, patches, around };
     let looks = ((LOOKS_EACH * patches.len() as f64) as usize).clamp(LOOKS[0], LOOKS[1]);
     progress.stage("stops: what is reached", Some(looks.min(count)));
-    let weights: Vec<f64> = patches.iter().map(|p| p.points.len() as f64).collect();
-    let mut open = Open::new(places, &weights);
-    let mut times = vec![0i32; patches.len()];
+    let mut worth: Vec<f64> = patches.iter().map(|p| p.points.len() as f64).collect();
+    let mut open = Open::new(places, &worth);
     let (mut sites, mut looked) = (Vec::new(), 0);
     while looked < looks.min(count) {
-        let batch = open.pick(&weights, &times, SIDE_BY_SIDE.min(looks - looked));
+        let batch = open.pick(&worth, SIDE_BY_SIDE.min(looks - looked));
         looked += batch.len();
         let found: Vec<_> = batch
             .par_iter()
             .map(|&at| {
                 let place = &open.places[at];
-                let found = ground.look(&place.stance, &place.promised);
+                let found = ground.look(&place.stance, &ground.near(&place.stance)?);
                 progress.tick();
                 found
             })
             .collect();
         for (at, reached) in batch.into_iter().zip(found) {
-            let Some(reached) = reached? else { continue };
-            let site = Site { stance: open.places[at].stance.clone(), reached };
+            let place = &open.places[at];
+            let reached = reached?.unwrap_or_default();
+            let site = Site { stance: place.stance.clone(), reached };
             let union = site.union();
-            union.iter().for_each(|&patch| times[patch as usize] += 1);
+            for &patch in &place.promised {
+                if union.binary_search(&patch).is_err() {
+                    worth[patch as usize] *= IN_VAIN;
+                }
+            }
+            union.iter().for_each(|&patch| worth[patch as usize] *= AGAIN);
             if !union.is_empty() {
                 sites.push(site);
             }
@@ -130,9 +137,8 @@ impl Open {
     }
 
     /// The places that promise most, each after what those before it promise.
-    fn pick(&mut self, weights: &[f64], times: &[i32], count: usize) -> Vec<usize> {
-        let now: Vec<f64> = weights.iter().zip(times).map(|(w, n)| w * AGAIN.powi(*n)).collect();
-        let mut then = now.clone();
+    fn pick(&mut self, now: &[f64], count: usize) -> Vec<usize> {
+        let mut then = now.to_vec();
         let mut heap: BinaryHeap<Bid> = (0..self.places.len())
             .filter(|&at| self.most[at] >= 0.0)
             .map(|at| Bid { value: self.most[at], at, after: usize::MAX })
@@ -144,11 +150,11 @@ impl Open {
             let place = &self.places[bid.at];
             if bid.after == picked.len() {
                 self.most[bid.at] = -1.0;
-                place.all.iter().for_each(|&patch| then[patch as usize] *= AGAIN);
+                place.promised.iter().for_each(|&patch| then[patch as usize] *= AGAIN);
                 picked.push(bid.at);
                 continue;
             }
-            self.most[bid.at] = promise(place, &now);
+            self.most[bid.at] = promise(place, now);
             heap.push(Bid { value: promise(place, &then), after: picked.len(), ..bid });
         }
         picked
@@ -156,7 +162,7 @@ impl Open {
 }
 
 fn promise(place: &Place, worth: &[f64]) -> f64 {
-    place.all.iter().map(|&patch| worth[patch as usize]).sum()
+    place.promised.iter().map(|&patch| worth[patch as usize]).sum()
 }
 
 /// What a place promises, looked at when so many were picked: the earlier one of two that are alike is

@@ -13,7 +13,7 @@ use crate::workcell::{Cause, Stance, Workcell, obstruction};
 
 /// Points that are not swept, by cause, what concerns most of them first.
 pub(super) fn unswept(of: &Rounds<'_>) -> Result<Vec<Unswept>, StopsError> {
-    let union = of.survey.union(of.patches.len());
+    let union = of.state.survey.union(of.patches.len());
     let mut owner: Vec<Option<usize>> = vec![None; of.swept.len()];
     for (p, patch) in of.patches.iter().enumerate() {
         patch.points.iter().for_each(|&point| owner[point as usize] = Some(p));
@@ -24,11 +24,12 @@ pub(super) fn unswept(of: &Rounds<'_>) -> Result<Vec<Unswept>, StopsError> {
             if is_swept(&of.patches[patch], &of.swept) {
                 return Ok(Cause::Passed.to_string());
             }
-            let tried = |stance: &Stance| of.worked.iter().any(|one| one.share.stance == *stance);
+            let tried =
+                |stance: &Stance| of.state.worked.iter().any(|one| one.share.stance == *stance);
             let at = |site: &&super::survey::Site| {
                 site.reached.iter().any(|of| of.binary_search(&(patch as u32)).is_ok())
             };
-            let mut from = of.survey.sites.iter().filter(at);
+            let mut from = of.state.survey.sites.iter().filter(at);
             if from.any(|site| tried(&site.stance)) {
                 return Ok("in reach of a stop, but no motion of its plans sweeps it".into());
             }
