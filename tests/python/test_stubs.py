@@ -48,6 +48,7 @@ def test_every_setting_is_a_flag_and_every_flag_a_setting(planner):
     cell = {"urdf", "arm", "package", "fit_capsules", "srdf", "posture", "tool", "torso", "held",
             "robot_name", "ipc_root", "cell"}
     shell = {"out", "json", "report", "help", "continue", "again", "scene"}
+    shell |= {"stops", "arms", "jobs", "job"}
     for command in ("plan", "task"):
         own = keywords(command) - {"progress", "after", "again", "scan"}
         assert own <= flags(planner, command)

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use nullsweep_ipc_types::{MAX_HELD_JOINTS, MAX_KNOTS};
 
-use super::program::PROGRAM_FORMAT;
-
 /// The version of the plan file that this build reads and writes.
 pub const FORMAT: u32 = 1;
+/// The version of the program file that this build reads and writes.
+pub const PROGRAM_FORMAT: u32 = 1;
 
 /// Why a plan file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +27,12 @@ pub enum PlanError {
         path: PathBuf,
         /// Line, column and cause.
         source: serde_json::Error,
+    },
+    /// The file is a program.
+    #[error("{path}: a program of several stops, not one plan")]
+    IsProgram {
+        /// Which file.
+        path: PathBuf,
     },
     /// Written by another version.
     #[error("{path}: plan format {found}, this build reads {FORMAT}: plan it again")]

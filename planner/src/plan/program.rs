@@ -5,12 +5,10 @@ use std::path::Path;
 use nalgebra::{Isometry3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::error::PlanError;
+use super::error::{PROGRAM_FORMAT, PlanError};
 use super::file::Plan;
+use super::kind::is_program;
 use super::seal::Seal;
-
-/// The version of the program file that this build reads and writes.
-pub const PROGRAM_FORMAT: u32 = 1;
 
 /// Plans at several stops of the robot, which together sweep a surface. Every plan of it begins and ends
 /// with its arm tucked, as the other arms are while it works.
@@ -116,16 +114,6 @@ impl ProgramStop {
 }
 
 impl Program {
-    /// Whether a text is a program rather than a plan.
-    #[must_use]
-    pub fn is_one(text: &str) -> bool {
-        #[derive(Deserialize)]
-        struct Probe {
-            program: Option<u32>,
-        }
-        serde_json::from_str::<Probe>(text).is_ok_and(|probe| probe.program.is_some())
-    }
-
     /// Reads a program file; `None` where it holds something else.
     ///
     /// # Errors
@@ -133,7 +121,7 @@ impl Program {
     pub fn read(path: &Path) -> Result<Option<Self>, PlanError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| PlanError::File { path: path.into(), source })?;
-        if Self::is_one(&text) { Self::parse(&text, path).map(Some) } else { Ok(None) }
+        if is_program(&text) { Self::parse(&text, path).map(Some) } else { Ok(None) }
     }
 
     /// Reads a program from the text of its file; `path` is only used to name it in errors.
