@@ -72,7 +72,7 @@ fn by_jobs(robot: &Robot, setup: &Setup, seat: &Scene) -> Program {
         let mut rounds =
             Rounds::resume(robot, setup, seat, through_file(&state)).expect("the same scene");
         let Some(stops) = rounds.next(&Silent).expect("stops") else {
-            return rounds.program(&Silent).expect("a program");
+            return stops::program(&rounds, &Silent).expect("a program");
         };
         let asked = through_file(rounds.state());
         let shares: Vec<Share> = stops.into_iter().flat_map(|stop| stop.shares).collect();

@@ -4,7 +4,7 @@
 use std::ffi::OsString;
 use std::sync::Arc;
 
-use clap::{Args, Parser};
+use clap::Args;
 use nalgebra::Isometry3;
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
@@ -18,8 +18,9 @@ use serde::Serialize;
 
 use crate::bars::Bars;
 use crate::exit::Usage;
+use crate::line::parse;
 use crate::numbers::{self, Held, finite};
-use crate::plan::PlanCommandArgs;
+use crate::plan_command::PlanCommandArgs;
 use crate::robot::{RobotArgs, tool_file};
 use crate::site::SiteArgs;
 use crate::task::PoseArgs;
@@ -61,25 +62,6 @@ impl Planned {
     pub fn page(&self) -> anyhow::Result<ReportData> {
         (self.page)()
     }
-}
-
-#[derive(Debug, Parser)]
-struct Line<A: Args> {
-    #[command(flatten)]
-    args: A,
-}
-
-/// Reads words as a command's arguments, a cell file's values where they say nothing.
-pub(super) fn parse<A: Args>(words: &[OsString]) -> anyhow::Result<A> {
-    let line = std::iter::once("planner".into()).chain(words.iter().cloned());
-    let parsed = nullsweep_cell::parse::<Line<A>>(line, &[], &[]);
-    let parsed = parsed.map_err(|error| {
-        let text = error.to_string();
-        // Usage and hints speak of a command line.
-        let told = text.split("\n\n").next().unwrap_or(&text);
-        Usage(told.trim_start_matches("error: ").trim().to_owned())
-    })?;
-    Ok(parsed.args)
 }
 
 /// `planner plan`: `words` are its arguments.

@@ -7,15 +7,16 @@ use anyhow::{Context, bail};
 use clap::Args;
 use nullsweep_planner::link::Site;
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::stops::{Rounds, Share, State, Worked};
+use nullsweep_planner::stops::{self, Rounds, Share, State, Worked};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::bars::Bars;
-use crate::calls::parse;
 use crate::exit::{MORE_JOBS, OK};
+use crate::line::parse;
 use crate::output::{say, writable};
-use crate::plan::{Files, PlanArgs, PlanCommandArgs};
+use crate::plan::{Files, PlanArgs};
+use crate::site::SiteArgs;
 use crate::stops::{Ground, StopsArgs, finish};
 
 /// What `planner join` goes on from.
@@ -129,7 +130,7 @@ pub(super) fn join(args: &JoinArgs) -> anyhow::Result<u8> {
         pin(folder, words, &rounds, &shares)?;
         return Ok(MORE_JOBS);
     }
-    let program = rounds.program(&bars);
+    let program = stops::program(&rounds, &bars);
     bars.clear();
     let [json, report] = [&args.json, &args.report].map(Option::as_deref);
     finish(&program?, Files { out: &args.out, json, report }, &ground)
@@ -180,8 +181,19 @@ fn own_words() -> anyhow::Result<Vec<String>> {
     Ok(words)
 }
 
+/// What those arguments say.
+#[derive(Debug, Args)]
+struct Again {
+    #[command(flatten)]
+    plan: PlanArgs,
+    #[command(flatten)]
+    stops: StopsArgs,
+    #[command(flatten)]
+    site: SiteArgs,
+}
+
 /// The arguments again.
-fn again(words: &[String]) -> anyhow::Result<PlanCommandArgs> {
+fn again(words: &[String]) -> anyhow::Result<Again> {
     let words: Vec<OsString> = words.iter().map(OsString::from).collect();
     parse(&words)
 }

@@ -18,12 +18,14 @@ mod inspect;
 mod jerk;
 mod jobs;
 mod json;
+mod line;
 mod numbers;
 mod obstacles;
 mod output;
 mod picture;
 mod placed;
 mod plan;
+mod plan_command;
 mod posture;
 mod posture_arg;
 mod program;
@@ -74,7 +76,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Make a plan from scans, or from a simulated scan.
-    Plan(Box<plan::PlanCommandArgs>),
+    Plan(Box<plan_command::PlanCommandArgs>),
     /// Put the plans of jobs together to a program, or write the next jobs.
     Join(jobs::JoinArgs),
     /// Show what is in a scanned scene: its planes, and its objects by number.
@@ -128,7 +130,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let result = match cli.command {
-        Command::Plan(args) => plan::run(&args),
+        Command::Plan(args) => plan_command::run(&args),
         Command::Join(args) => jobs::join(&args),
         Command::Scene(args) => scene_command::run(&args),
         Command::Task(args) => task::run(&args),

@@ -31,8 +31,6 @@ use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
-use crate::site::SiteArgs;
-use crate::stops::StopsArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -196,32 +194,6 @@ impl FromStr for KnotOf {
     }
 }
 
-/// A plan by itself, not in place of one that runs.
-#[derive(Debug, Args)]
-pub(super) struct PlanCommandArgs {
-    #[command(flatten)]
-    pub(super) plan: PlanArgs,
-    #[command(flatten)]
-    pub(super) stops: StopsArgs,
-    #[command(flatten)]
-    pub(super) site: SiteArgs,
-}
-
-pub(super) fn run(command: &PlanCommandArgs) -> anyhow::Result<u8> {
-    let args = &command.plan;
-    if let Some(done) = command.stops.run(args, command.site.site()) {
-        return done;
-    }
-    let after = match &args.after {
-        None => None,
-        Some(KnotOf { plan, knot }) => {
-            let plan = Plan::read(plan)?;
-            Some(After { plan, knot: *knot, held: None, again: args.again })
-        }
-    };
-    Ok(make(args, command.site.site(), after)?.0)
-}
-
 /// Makes a plan, writes what was asked for, and gives the exit code with it.
 pub(super) fn make(
     args: &PlanArgs,
@@ -273,6 +245,13 @@ impl PlanArgs {
         let outcome = pipeline::run(&robot, &scene, &job, bars);
         bars.clear();
         Ok(Made { robot, scene, collision: job.collision, outcome: outcome? })
+    }
+
+    /// The plan that this one goes on from, if one is named.
+    pub(super) fn after(&self) -> anyhow::Result<Option<After>> {
+        let Some(KnotOf { plan, knot }) = &self.after else { return Ok(None) };
+        let plan = Plan::read(plan)?;
+        Ok(Some(After { plan, knot: *knot, held: None, again: self.again }))
     }
 
     /// What is to be planned.

@@ -13,7 +13,6 @@ use nullsweep_robot::{ArmSpec, Robot, Side};
 
 use crate::bars::Bars;
 use crate::exit::{OK, Usage};
-use crate::jobs;
 use crate::json::write_json;
 use crate::output::{say, writable};
 use crate::picture::of_program as page;
@@ -75,16 +74,14 @@ impl FromStr for Arms {
 }
 
 impl StopsArgs {
-    /// Does what is asked for, if that is several stops or a job of some.
-    pub(super) fn run(&self, plan: &PlanArgs, site: Site<'_>) -> Option<anyhow::Result<u8>> {
-        if let Some(job) = &self.job {
-            return Some(jobs::work(job));
-        }
-        self.stops?;
-        Some(match &self.jobs {
-            Some(folder) => jobs::write(self, plan, site, folder),
-            None => run(self, plan, site),
-        })
+    /// Where the jobs are to be written.
+    pub(super) fn jobs(&self) -> Option<&Path> {
+        self.jobs.as_deref()
+    }
+
+    /// The job that is to be done.
+    pub(super) fn job(&self) -> Option<&Path> {
+        self.job.as_deref()
     }
 
     /// Whether several stops are asked for.
@@ -157,7 +154,7 @@ impl StopsArgs {
 }
 
 /// Makes the program and writes what was asked for.
-fn run(args: &StopsArgs, plan: &PlanArgs, site: Site<'_>) -> anyhow::Result<u8> {
+pub(super) fn run(args: &StopsArgs, plan: &PlanArgs, site: Site<'_>) -> anyhow::Result<u8> {
     let files = plan.files();
     for out in [Some(files.out), files.json, files.report].into_iter().flatten() {
         writable(out)?;

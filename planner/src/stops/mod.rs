@@ -13,6 +13,7 @@ mod floor;
 mod look;
 mod program;
 mod rounds;
+mod run;
 mod setup;
 mod share;
 mod survey;
@@ -21,7 +22,9 @@ mod unswept;
 
 pub use choice::Stop;
 pub use error::StopsError;
-pub use rounds::{Rounds, State, run};
+pub use program::program;
+pub use rounds::{Rounds, State};
+pub use run::run;
 pub use setup::{Setup, lifts};
 pub use share::{Share, Worked, work};
 pub use survey::{Site, Survey, survey};

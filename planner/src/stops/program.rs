@@ -11,8 +11,11 @@ use crate::plan::{PROGRAM_FORMAT, Plan, Program, ProgramStop, Totals, Work};
 use crate::progress::Progress;
 use crate::workcell::Stance;
 
-/// The program of all plans, sealed.
-pub(super) fn assemble(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Program, StopsError> {
+/// The program of all that was done, sealed.
+///
+/// # Errors
+/// See [`StopsError`].
+pub fn program(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Program, StopsError> {
     progress.stage("program", None);
     let limbs = of.setup.limbs(of.robot)?;
     let sketch = of.scene.sketch();

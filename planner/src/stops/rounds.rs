@@ -1,5 +1,4 @@
-//! The whole object on one page: what is reached is surveyed, stops are chosen, their plans made, and
-//! what those have not swept is chosen for again.
+//! Round after round: stops are chosen for what is not swept yet, and what came of their plans is added.
 
 use nullsweep_robot::Robot;
 use nullsweep_surface::Patch;
@@ -9,12 +8,10 @@ use serde::{Deserialize, Serialize};
 use super::choice::{Open, Stop, choose};
 use super::error::StopsError;
 use super::look::Ground;
-use super::program::assemble;
 use super::setup::Setup;
 use super::share::{Share, Worked, work};
 use super::survey::{Site, Survey, survey};
 use crate::pipeline::{is_swept, patches_of};
-use crate::plan::Program;
 use crate::progress::Progress;
 use crate::workcell::{Scene, Stance};
 
@@ -43,33 +40,6 @@ pub struct Rounds<'a> {
     pub(super) state: State,
     /// Which points of the scene are swept.
     pub(super) swept: Vec<bool>,
-}
-
-/// Chooses stops and makes their plans, round after round, and puts the program together.
-///
-/// # Errors
-/// See [`StopsError`].
-pub fn run(
-    robot: &Robot,
-    setup: &Setup,
-    scene: &Scene,
-    progress: &dyn Progress,
-) -> Result<Program, StopsError> {
-    let mut rounds = Rounds::begin(robot, setup, scene, progress)?;
-    while let Some(stops) = rounds.next(progress)? {
-        let shares: Vec<Share> = stops.into_iter().flat_map(|stop| stop.shares).collect();
-        progress.stage("plans of the stops", Some(shares.len()));
-        let worked: Vec<_> = shares
-            .par_iter()
-            .map(|share| {
-                let worked = rounds.work(share);
-                progress.tick();
-                worked
-            })
-            .collect();
-        rounds.add(worked.into_iter().collect::<Result<_, _>>()?);
-    }
-    rounds.program(progress)
 }
 
 impl<'a> Rounds<'a> {
@@ -195,14 +165,6 @@ impl<'a> Rounds<'a> {
             self.swept[*point as usize] = true;
         }
         self.state.worked.extend(worked);
-    }
-
-    /// The program of all that was done.
-    ///
-    /// # Errors
-    /// See [`StopsError`].
-    pub fn program(&self, progress: &dyn Progress) -> Result<Program, StopsError> {
-        assemble(self, progress)
     }
 
     /// The stops that have a plan, in the order in which they were chosen.
