@@ -44,6 +44,7 @@ pub mod poses;
 
 pub mod follow;
 pub mod pipeline;
+pub mod stops;
 pub mod task;
 pub mod transit;
 

@@ -10,8 +10,10 @@ use pyo3::types::{PyBool, PyDict, PyString};
 use crate::errors::UsageError;
 
 /// Flags of a command alone: what it writes is returned here, and what it reads is given otherwise.
-const ELSEWHERE: [&str; 9] =
-    ["out", "json", "report", "cell", "continue", "help", "version", "quat", "offset"];
+const ELSEWHERE: [&str; 13] = [
+    "out", "json", "report", "cell", "continue", "help", "version", "quat", "offset", "stops", "arms",
+    "jobs", "job",
+];
 
 /// Each keyword as a flag; `None` and `False` say nothing, `True` is a flag without a value, of a
 /// dictionary each item is NAME=VALUE, numbers of a sequence stand apart by commas, and a sequence of

@@ -47,8 +47,8 @@ def test_every_setting_is_a_flag_and_every_flag_a_setting(planner):
             "unseen", "crop", "object", "obstacles", "demo"}
     cell = {"urdf", "arm", "package", "fit_capsules", "srdf", "posture", "tool", "torso", "held",
             "robot_name", "ipc_root", "cell"}
-    shell = {"out", "json", "report", "help", "continue", "again", "scene",
-             "quat", "offset"}
+    shell = {"out", "json", "report", "help", "continue", "again", "scene", "quat", "offset"}
+    shell |= {"stops", "arms", "jobs", "job"}
     for command in ("plan", "task", "follow"):
         own = keywords(command) - {"progress", "after", "again", "scan"}
         assert own <= flags(planner, command)

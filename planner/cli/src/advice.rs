@@ -169,6 +169,9 @@ const STANDS_IN: &str = "--base says where in the scene the robot stands; space 
 fn plan(error: &PlanError) -> Option<String> {
     let text = match error {
         PlanError::Parse { .. } => "`planner plan` makes a plan file",
+        PlanError::IsProgram { .. } => {
+            "`planner inspect PROGRAM --plans FOLDER` writes each of its plans as a file of its own"
+        }
         PlanError::TooLong { .. } => "plan fewer patches at once: --crop keeps a part of the scan",
         _ => return None,
     };

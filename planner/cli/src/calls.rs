@@ -4,7 +4,7 @@
 use std::ffi::OsString;
 use std::sync::Arc;
 
-use clap::{Args, Parser};
+use clap::Args;
 use nalgebra::Isometry3;
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
@@ -19,8 +19,9 @@ use serde::Serialize;
 use crate::bars::Bars;
 use crate::exit::Usage;
 use crate::follow::PathArgs;
+use crate::line::parse;
 use crate::numbers::{self, Held, finite};
-use crate::plan::PlanCommandArgs;
+use crate::plan_command::PlanCommandArgs;
 use crate::robot::{RobotArgs, tool_file};
 use crate::site::SiteArgs;
 use crate::task::PoseArgs;
@@ -64,25 +65,6 @@ impl Planned {
     }
 }
 
-#[derive(Debug, Parser)]
-struct Line<A: Args> {
-    #[command(flatten)]
-    args: A,
-}
-
-/// Reads words as a command's arguments, a cell file's values where they say nothing.
-fn parse<A: Args>(words: &[OsString]) -> anyhow::Result<A> {
-    let line = std::iter::once("planner".into()).chain(words.iter().cloned());
-    let parsed = nullsweep_cell::parse::<Line<A>>(line, &[], &[]);
-    let parsed = parsed.map_err(|error| {
-        let text = error.to_string();
-        // Usage and hints speak of a command line.
-        let told = text.split("\n\n").next().unwrap_or(&text);
-        Usage(told.trim_start_matches("error: ").trim().to_owned())
-    })?;
-    Ok(parsed.args)
-}
-
 /// `planner plan`: `words` are its arguments.
 ///
 /// # Errors
@@ -93,6 +75,11 @@ pub fn plan(
     listener: Listener,
 ) -> anyhow::Result<Planned> {
     let args: PlanCommandArgs = parse(words)?;
+    if args.stops.is_asked() {
+        let why =
+            "--stops makes a program of several plans: the command has it, a function has not";
+        return Err(Usage(why.into()).into());
+    }
     let made = args.plan.work(args.site.site(), after, &Bars::of(listener))?;
     let made = Arc::new(made);
     let (outcome, page) = (&made.outcome, Arc::clone(&made));

@@ -14,6 +14,9 @@ pub const VIOLATIONS: u8 = 3;
 /// The executor was lost while its answer or a plan's end was waited for.
 pub const LOST: u8 = 4;
 
+/// Jobs are to be done before `join` can go on.
+pub const MORE_JOBS: u8 = 5;
+
 /// Nobody reads what is written any more: as a shell tells a signal.
 pub(super) const BROKEN_PIPE: i32 = 128 + 13;
 

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use nullsweep_planner::cost::{Effort, of_path};
-use nullsweep_planner::plan::Plan;
+use nullsweep_planner::plan::{Plan, Program};
 use nullsweep_planner::sweep::{DIP, Pace, Passes, passes};
 use nullsweep_planner::workcell::stance::told;
 use nullsweep_robot::MAX_DOF;
@@ -14,14 +15,18 @@ use crate::exit::OK;
 use crate::figures::pace_rows;
 use crate::json::write_json;
 use crate::numbers::positive;
-use crate::output::say_on;
+use crate::output::{say, say_on};
+use crate::program;
 use crate::robot::RobotArgs;
 use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
 pub(super) struct InspectArgs {
-    /// The plan file.
+    /// The plan file, or a program's.
     plan: PathBuf,
+    /// Of a program: write each plan into this folder as a file of its own, stop-1-1.json and so on.
+    #[arg(long, value_name = "FOLDER")]
+    plans: Option<PathBuf>,
     #[command(flatten)]
     robot: RobotArgs,
     /// What counts as a dip of the tool's speed on the surface. [m/s]
@@ -68,12 +73,37 @@ struct JointSummary {
 }
 
 pub(super) fn run(args: &InspectArgs) -> anyhow::Result<u8> {
+    if let Some(program) = Program::read(&args.plan)? {
+        return of_program(args, &program);
+    }
     let plan = Plan::read(&args.plan)?;
     let (pace, passes) = paced(args, &plan)?.unzip();
     let summary = Summary { pace, passes, ..summarise(&plan) };
     match &args.json {
         Some(path) => write_json(&summary, path)?,
         None => say_on!("{}", tables(&summary)),
+    }
+    Ok(OK)
+}
+
+/// A program's stops and totals; its plans as files of their own where that is asked for.
+fn of_program(args: &InspectArgs, program: &Program) -> anyhow::Result<u8> {
+    if let Some(folder) = &args.plans {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        for (s, stop) in program.stops.iter().enumerate() {
+            for (w, work) in stop.works.iter().enumerate() {
+                work.plan.write(&folder.join(format!("stop-{}-{}.json", s + 1, w + 1)))?;
+            }
+        }
+    }
+    match &args.json {
+        Some(path) => write_json(&program::figures(program), path)?,
+        None => {
+            let verified =
+                program.check_seal().err().map_or_else(|| "yes".into(), |e| e.to_string());
+            say!("{}\nverified: {verified}", program::table(program));
+        }
     }
     Ok(OK)
 }

@@ -16,15 +16,19 @@ mod goto;
 mod gtsp;
 mod inspect;
 mod jerk;
+mod jobs;
 mod json;
+mod line;
 mod numbers;
 mod obstacles;
 mod output;
 mod picture;
 mod placed;
 mod plan;
+mod plan_command;
 mod posture;
 mod posture_arg;
+mod program;
 mod publish;
 mod refusal;
 mod replan;
@@ -36,6 +40,7 @@ mod scene_file;
 mod send;
 mod sheet;
 mod site;
+mod stops;
 mod table;
 mod task;
 mod verify;
@@ -44,7 +49,7 @@ mod views;
 mod way;
 
 pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
-pub use exit::{FAILED, LOST, OK, USAGE, VIOLATIONS};
+pub use exit::{FAILED, LOST, MORE_JOBS, OK, USAGE, VIOLATIONS};
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -61,7 +66,7 @@ use output::complain;
 #[command(
     name = "planner",
     version,
-    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule; 4 the executor was lost while it was waited for."
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 the plan breaks a rule; 4 the executor was lost while it was waited for; 5 jobs are to be done before `join` can go on."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -71,7 +76,9 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Make a plan from scans, or from a simulated scan.
-    Plan(Box<plan::PlanCommandArgs>),
+    Plan(Box<plan_command::PlanCommandArgs>),
+    /// Put the plans of jobs together to a program, or write the next jobs.
+    Join(jobs::JoinArgs),
     /// Show what is in a scanned scene: its planes, and its objects by number.
     Scene(Box<scene_command::SceneCommandArgs>),
     /// Make a plan through given tool poses, in whatever order is shortest.
@@ -123,7 +130,8 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let result = match cli.command {
-        Command::Plan(args) => plan::run(&args),
+        Command::Plan(args) => plan_command::run(&args),
+        Command::Join(args) => jobs::join(&args),
         Command::Scene(args) => scene_command::run(&args),
         Command::Task(args) => task::run(&args),
         Command::Follow(args) => follow::run(&args),

@@ -1,6 +1,6 @@
 //! `planner plan`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::Context;
@@ -31,7 +31,6 @@ use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
-use crate::site::SiteArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -46,7 +45,7 @@ pub(super) struct PlanArgs {
     scene: SceneArgs,
 
     #[command(flatten)]
-    robot: RobotArgs,
+    pub(super) robot: RobotArgs,
     /// The tool, a TOML file; without it a sponge of 0.10 × 0.07 m.
     #[arg(long, value_name = "FILE")]
     tool: Option<PathBuf>,
@@ -195,27 +194,6 @@ impl FromStr for KnotOf {
     }
 }
 
-/// A plan by itself, not in place of one that runs.
-#[derive(Debug, Args)]
-pub(super) struct PlanCommandArgs {
-    #[command(flatten)]
-    pub(super) plan: PlanArgs,
-    #[command(flatten)]
-    pub(super) site: SiteArgs,
-}
-
-pub(super) fn run(command: &PlanCommandArgs) -> anyhow::Result<u8> {
-    let args = &command.plan;
-    let after = match &args.after {
-        None => None,
-        Some(KnotOf { plan, knot }) => {
-            let plan = Plan::read(plan)?;
-            Some(After { plan, knot: *knot, held: None, again: args.again })
-        }
-    };
-    Ok(make(args, command.site.site(), after)?.0)
-}
-
 /// Makes a plan, writes what was asked for, and gives the exit code with it.
 pub(super) fn make(
     args: &PlanArgs,
@@ -227,6 +205,14 @@ pub(super) fn make(
     }
     let made = args.work(site, after, &Bars::new())?;
     Ok((finish(args, &made)?, made.outcome.plan))
+}
+
+/// What is written, and where.
+#[derive(Clone, Copy)]
+pub(super) struct Files<'a> {
+    pub(super) out: &'a Path,
+    pub(super) json: Option<&'a Path>,
+    pub(super) report: Option<&'a Path>,
 }
 
 /// What was made, and of what.
@@ -259,6 +245,35 @@ impl PlanArgs {
         let outcome = pipeline::run(&robot, &scene, &job, bars);
         bars.clear();
         Ok(Made { robot, scene, collision: job.collision, outcome: outcome? })
+    }
+
+    /// The plan that this one goes on from, if one is named.
+    pub(super) fn after(&self) -> anyhow::Result<Option<After>> {
+        let Some(KnotOf { plan, knot }) = &self.after else { return Ok(None) };
+        let plan = Plan::read(plan)?;
+        Ok(Some(After { plan, knot: *knot, held: None, again: self.again }))
+    }
+
+    /// What is to be planned.
+    pub(super) fn job(
+        &self,
+        robot: &Robot,
+        site: Site<'_>,
+        after: Option<After>,
+        bars: &Bars,
+    ) -> anyhow::Result<Job> {
+        job(self, robot, site, after, bars)
+    }
+
+    /// What is written, and where.
+    pub(super) fn files(&self) -> Files<'_> {
+        let [json, report] = [&self.json, &self.report].map(Option::as_deref);
+        Files { out: &self.out, json, report }
+    }
+
+    /// Held joints that are given.
+    pub(super) fn held(&self) -> Vec<(String, f64)> {
+        held(self)
     }
 
     /// What is there, in the floor frame.
@@ -310,7 +325,7 @@ fn finish(args: &PlanArgs, made: &Made) -> anyhow::Result<u8> {
     if let Some(path) = &args.json {
         write_json(figures, path)?;
     }
-    let to_stdout = args.json.as_deref() == Some(std::path::Path::new("-"));
+    let to_stdout = args.json.as_deref() == Some(Path::new("-"));
     if !to_stdout {
         say!("{}", table(figures));
     }
@@ -379,6 +394,7 @@ fn job(
             EndArg::At(end) => End::At(posture(end, "--end")?),
         },
         after,
+        spared: Vec::new(),
         method: args.method.method(),
         cost: args.cost.into(),
         ik_samples: args.ik_samples as usize,

@@ -80,6 +80,11 @@ impl RobotArgs {
         Ok(self.robot()?.arm(&self.arm)?)
     }
 
+    /// Whether it is the PR2 as this project describes it.
+    pub(super) fn is_pr2(&self) -> bool {
+        self.urdf.is_none()
+    }
+
     /// Whether nothing was said of the arm.
     pub(super) fn is_default_arm(&self) -> bool {
         self.arm == ArmSpec::pr2(Side::Right)

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use nalgebra::Point3;
 use nullsweep_collision::Options;
-use nullsweep_planner::plan::Plan;
+use nullsweep_planner::plan::{Plan, Program};
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::verify::{Given, Verification, verify};
 use nullsweep_planner::workcell::Scene;
@@ -13,9 +14,10 @@ use nullsweep_report::ReportData;
 use nullsweep_robot::{ArmSpec, Robot};
 
 use crate::bars::Bars;
-use crate::exit::{OK, VIOLATIONS};
+use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::figures::{verified_rows, verified_table};
 use crate::json::write_json;
+use crate::numbers::percent;
 use crate::output::{complain, say, writable};
 use crate::picture::{Sitter, picture};
 use crate::refusal::tell;
@@ -64,6 +66,9 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
         writable(out)?;
     }
     let bars = Bars::new();
+    if let Some(program) = Program::read(&args.plan)? {
+        return program_run(args, program, &bars);
+    }
     let plan = Plan::read(&args.plan)?;
     let found = args.against.check(&plan, &bars)?.verification;
     match &args.json {
@@ -81,6 +86,52 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<u8> {
     }
     if let Some(out) = &args.out {
         plan.sealed().write(out)?;
+    }
+    Ok(OK)
+}
+
+/// The same of every plan of a program, each in what is near its stop.
+fn program_run(args: &VerifyArgs, program: Program, bars: &Bars) -> anyhow::Result<u8> {
+    let against = &args.against;
+    let robot = against.robot.robot()?;
+    let collision = against.robot.collision();
+    let first = program.stops.iter().flat_map(|stop| &stop.works).map(|work| &work.plan).next();
+    let scene = first.map(|plan| against.scene(plan, bars)).transpose()?;
+    let Some(scene) = scene else { return Ok(OK) };
+    let mut swept = vec![false; scene.surface.points.len()];
+    let mut table = sheet(["stop", "arm", "violations", "adds"]);
+    let (mut broken, mut all) = (0, Vec::new());
+    for (s, work) in program.works() {
+        let [x, y, _] = work.plan.base;
+        let (here, kept) = scene.near([x, y], program.near_m);
+        let arm: ArmSpec = work.arm.parse().map_err(Usage)?;
+        bars.stage("verify", Some(work.plan.knots.len()));
+        let given = Given { robot: &robot, arm: &arm, scene: &here, collision: &collision };
+        let found = verify(&work.plan, given, &|| bars.tick());
+        bars.clear();
+        let found = found.with_context(|| format!("stop {}", s + 1))?;
+        let mut new = 0;
+        for point in kept.iter().zip(&found.swept).filter(|(_, s)| **s).map(|(p, _)| *p as usize) {
+            new += usize::from(!std::mem::replace(&mut swept[point], true));
+        }
+        let share = new as f64 / swept.len().max(1) as f64;
+        let (stop, count) = ((s + 1).to_string(), found.violations.len().to_string());
+        table.add_row([stop, work.arm.clone(), count, percent(share)]);
+        tell(&found.violations);
+        broken += found.violations.len();
+        all.push(found);
+    }
+    let share = swept.iter().filter(|s| **s).count() as f64 / swept.len().max(1) as f64;
+    match &args.json {
+        Some(path) => write_json(&all, path)?,
+        None => say!("{table}\nswept of all points: {} of {}", percent(share), swept.len()),
+    }
+    if broken > 0 {
+        complain!("planner: the program breaks {broken} rules");
+        return Ok(VIOLATIONS);
+    }
+    if let Some(out) = &args.out {
+        program.sealed().write(out)?;
     }
     Ok(OK)
 }

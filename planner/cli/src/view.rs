@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use nullsweep_planner::plan::Plan;
+use nullsweep_planner::plan::{Plan, Program};
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::verify::{Given, verify};
 use nullsweep_recording::Recording;
@@ -17,7 +17,7 @@ use crate::bars::Bars;
 use crate::exit::{OK, Usage};
 use crate::figures::verified_table;
 use crate::output::{say, tell, writable};
-use crate::picture::{Flight, Posed, Sitter, picture, recorded};
+use crate::picture::{self, Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
 use crate::robot::{RobotArgs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
@@ -69,6 +69,12 @@ pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
         let why = "a scan beside --demo: the scene is one or the other";
         return Err(Usage(format!("{}: {why}", scan.display())).into());
     }
+    if let [file] = plans[..]
+        && let Some(program) = Program::read(file)?
+    {
+        let data = of_program(args, &program, &scans, &bars)?;
+        return finish(args, &out, &data, &bars);
+    }
     let plans = plans.into_iter().map(|file| Plan::read(file)).collect::<Result<Vec<_>, _>>()?;
     let data = if let (Some(recording), true) = (recordings.first(), plans.is_empty()) {
         if recordings.len() > 1 || !scans.is_empty() || args.demo.is_some() {
@@ -92,18 +98,42 @@ pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
     } else {
         of_plans(args, &plans, &scans, &recordings, &bars)?
     };
+    finish(args, &out, &data, &bars)
+}
+
+/// Writes the page and what else was asked for.
+fn finish(args: &ViewArgs, out: &Path, data: &ReportData, bars: &Bars) -> anyhow::Result<u8> {
     bars.clear();
-    report::write(&out, &data)?;
+    report::write(out, data)?;
     say!("page: {}", out.display());
     if let Some(path) = &args.mcap {
         let there = || format!("cannot write {}", path.display());
-        report::write_log(path, &data).with_context(there)?;
+        report::write_log(path, data).with_context(there)?;
         say!("log: {}", path.display());
     }
     if !args.no_open {
-        open(&out);
+        open(out);
     }
     Ok(OK)
+}
+
+/// The page of a program, in its scene if that is given.
+fn of_program(
+    args: &ViewArgs,
+    program: &Program,
+    scans: &[PathBuf],
+    bars: &Bars,
+) -> anyhow::Result<ReportData> {
+    let seed = program.works().map(|(_, work)| work.plan.seed).next().unwrap_or(1);
+    let is_given = args.demo.is_some() || !scans.is_empty();
+    let read = || {
+        bars.stage("scan", None);
+        scene(&args.scene, args.demo, scans, args.seed.unwrap_or(seed), bars)
+    };
+    let scene = is_given.then(read).transpose()?;
+    bars.stage("picture", None);
+    let (robot, collision) = (args.robot.robot()?, args.robot.collision());
+    picture::of_program(program, &robot, &collision, scene.as_ref())
 }
 
 /// The page of plans, in their scene if that is given.

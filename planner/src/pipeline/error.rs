@@ -32,6 +32,9 @@ pub enum PipelineError {
         /// How many points.
         points: usize,
     },
+    /// Nothing is this plan's.
+    #[error("every patch is swept before or left to others: nothing is left to plan")]
+    AllSpared,
     /// No stance reaches anything.
     #[error(
         "no stance of {tried} reaches any of the {patches} patches; where most seemed in reach: {why}"

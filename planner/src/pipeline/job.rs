@@ -25,6 +25,9 @@ pub struct Job {
     pub end: End,
     /// A plan that this one goes on from.
     pub after: Option<After>,
+    /// Points of the scene's surface that are none of this plan's: swept before, or another stop's.
+    /// Empty: there are none.
+    pub spared: Vec<bool>,
     /// How the order is found; `None`: by Curvature, Joint or Raster, whichever plan takes the least
     /// time of those that sweep about as much as Curvature's.
     pub method: Option<Method>,
@@ -71,6 +74,7 @@ impl Job {
             start: None,
             end: End::default(),
             after: None,
+            spared: Vec::new(),
             method: Some(Method::Curvature),
             cost: CostKind::Time,
             ik_samples: 100,

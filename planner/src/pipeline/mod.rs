@@ -25,4 +25,5 @@ pub use figures::Figures;
 pub use job::{After, End, Job, StanceChoice};
 pub use left_out::LeftOut;
 pub use other::FreeFrom;
-pub use run::{Outcome, run};
+pub use run::{Outcome, patches_of, run};
+pub use swept::is_swept;

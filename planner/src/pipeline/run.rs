@@ -15,7 +15,7 @@ use super::job::{After, Job};
 use super::left_out::{Known, in_words, left_out};
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
-use super::swept::{points_of, swept_before};
+use super::swept::{points_of, swept_before, without_swept};
 use crate::cost;
 use crate::motion::Memo;
 use crate::plan::Plan;
@@ -60,13 +60,10 @@ pub fn run(
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
-    let all = clock.time("patches", || {
-        let found = patches::find(&scene.surface, &job.patches, job.seed);
-        let bed = Bed::new(scene, &job.tool);
-        found.into_par_iter().filter_map(|patch| bed.laid(patch)).collect::<Vec<_>>()
-    });
+    let all = clock.time("patches", || patches_of(scene, job))?;
+    let all = without_swept(all, &job.spared);
     if all.is_empty() {
-        return Err(PipelineError::NoPatches { points: scene.surface.points.len() });
+        return Err(PipelineError::AllSpared);
     }
 
     progress.stage("stance", None);
@@ -77,7 +74,8 @@ pub fn run(
         progress.note(note);
     }
     let (start, rest) = begin(job, &arm, &world, progress)?;
-    let already = swept_before(job, rest.as_ref(), &arm, scan)?;
+    let mut already = swept_before(job, rest.as_ref(), &arm, scan)?;
+    already.iter_mut().zip(&job.spared).for_each(|(already, spared)| *already |= spared);
 
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
     progress.stage("reach", Some(patches.len()));
@@ -113,12 +111,14 @@ pub fn run(
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
     let verification = clock.time("verify", || verify(&plan, given, &|| progress.tick()))?;
+    let mut done = verification.swept.clone();
+    done.iter_mut().zip(&job.spared).for_each(|(done, spared)| *done |= spared);
     let known = Known {
         scan,
         patches: &found,
         reachable: &reachable,
         dropped: &sequence.dropped,
-        swept: &verification.swept,
+        swept: &done,
     };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
     let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
@@ -146,6 +146,20 @@ pub fn run(
     reachable.resize(patches.len(), true);
     let scan = here.surface;
     Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
+}
+
+/// The patches of a scene as the pad lies on them, in its frame: what a plan visits.
+///
+/// # Errors
+/// [`PipelineError::NoPatches`].
+pub fn patches_of(scene: &Scene, job: &Job) -> Result<Vec<Patch>, PipelineError> {
+    let found = patches::find(&scene.surface, &job.patches, job.seed);
+    let bed = Bed::new(scene, &job.tool);
+    let laid: Vec<Patch> = found.into_par_iter().filter_map(|patch| bed.laid(patch)).collect();
+    if laid.is_empty() {
+        return Err(PipelineError::NoPatches { points: scene.surface.points.len() });
+    }
+    Ok(laid)
 }
 
 /// Where the arm begins; for a plan that joins another one in motion, after the way to rest on the

@@ -43,12 +43,26 @@ pub(super) fn swept_before(
 /// Share of a patch's points from which on it counts as swept.
 pub(super) const SWEPT_SHARE: f64 = 0.9;
 
+/// Whether a patch counts as swept where these points are.
+#[must_use]
+pub fn is_swept(patch: &Patch, already: &[bool]) -> bool {
+    let swept = patch.points.iter().filter(|&&i| already[i as usize]).count();
+    swept as f64 >= SWEPT_SHARE * patch.points.len() as f64
+}
+
 /// Takes patches that are swept already out of what is to be visited.
 pub(super) fn leave_out_swept(reached: &mut [Option<Sample>], patches: &[Patch], already: &[bool]) {
     for (entry, patch) in reached.iter_mut().zip(patches) {
-        let swept = patch.points.iter().filter(|&&i| already[i as usize]).count();
-        if swept as f64 >= SWEPT_SHARE * patch.points.len() as f64 {
+        if is_swept(patch, already) {
             *entry = None;
         }
     }
+}
+
+/// The patches that are not swept already; all where nothing is said of any point.
+pub(super) fn without_swept(mut patches: Vec<Patch>, already: &[bool]) -> Vec<Patch> {
+    if !already.is_empty() {
+        patches.retain(|patch| !is_swept(patch, already));
+    }
+    patches
 }

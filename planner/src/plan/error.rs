@@ -6,6 +6,8 @@ use nullsweep_ipc_types::{MAX_HELD_JOINTS, MAX_KNOTS};
 
 /// The version of the plan file that this build reads and writes.
 pub const FORMAT: u32 = 1;
+/// The version of the program file that this build reads and writes.
+pub const PROGRAM_FORMAT: u32 = 1;
 
 /// Why a plan file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +28,12 @@ pub enum PlanError {
         /// Line, column and cause.
         source: serde_json::Error,
     },
+    /// The file is a program.
+    #[error("{path}: a program of several stops, not one plan")]
+    IsProgram {
+        /// Which file.
+        path: PathBuf,
+    },
     /// Written by another version.
     #[error("{path}: plan format {found}, this build reads {FORMAT}: plan it again")]
     Format {
@@ -33,6 +41,22 @@ pub enum PlanError {
         path: PathBuf,
         /// Its version.
         found: u32,
+    },
+    /// A program that was written by another version.
+    #[error("{path}: program format {found}, this build reads {PROGRAM_FORMAT}: plan it again")]
+    ProgramFormat {
+        /// Which file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// A plan of a program was made for another place.
+    #[error("plan {work} of stop {stop} was made for another place or other held joints")]
+    OtherStop {
+        /// Which stop, from 1.
+        stop: usize,
+        /// Which plan of it, from 1.
+        work: usize,
     },
     /// It never passed the last gate.
     #[error("the plan was not verified")]

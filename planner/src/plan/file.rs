@@ -9,6 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::curve::Curve;
 use super::error::{FORMAT, PlanError};
+use super::kind::is_program;
 use super::knot::PlanKnot;
 use super::seal::Seal;
 use super::settings::{CostKind, Method, Profile};
@@ -181,8 +182,14 @@ impl Plan {
     /// # Errors
     /// As [`Self::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, PlanError> {
-        let plan: Self = serde_json::from_str(text)
-            .map_err(|source| PlanError::Parse { path: path.into(), source })?;
+        let plan: Self = serde_json::from_str(text).map_err(|source| {
+            let path = path.into();
+            if is_program(text) {
+                PlanError::IsProgram { path }
+            } else {
+                PlanError::Parse { path, source }
+            }
+        })?;
         if plan.format == FORMAT {
             Ok(plan)
         } else {

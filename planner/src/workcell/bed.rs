@@ -14,7 +14,7 @@ use super::scene::Scene;
 const SPARE: f64 = 0.0005;
 /// Farthest that its centre is raised off the surface, and besides by what it is pressed in: a sponge
 /// still touches where it is pressed elsewhere. \[m\]
-const HIGHEST: f64 = 0.005;
+const HIGHEST: f64 = 0.0045;
 /// What rises higher over the pad's plane is no unevenness but another thing, which the pad has to
 /// keep away from. \[m\]
 const UNEVEN: f64 = 0.025;

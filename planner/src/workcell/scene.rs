@@ -131,6 +131,34 @@ impl Scene {
         thinned(&all, side)
     }
 
+    /// The scene as far as a distance \[m\] from a place on the floor, all heights, solid things as they
+    /// are; second, which points of the surface that leaves, as indices. All of them in a scene no
+    /// larger than that.
+    #[must_use]
+    pub fn near(&self, place: [f64; 2], distance: f64) -> (Self, Vec<u32>) {
+        let [x, y] = place;
+        let is_near = |p: &Point3<f64>| (p.x - x).hypot(p.y - y) <= distance;
+        let some = |points: &[Point3<f64>]| points.iter().copied().filter(is_near).collect();
+        let kept: Vec<u32> = (0..self.surface.points.len() as u32)
+            .filter(|&i| is_near(&self.surface.points[i as usize]))
+            .collect();
+        let Scan { points, normals, raw, spacing } = &self.surface;
+        let surface = Scan {
+            points: kept.iter().map(|&i| points[i as usize]).collect(),
+            normals: kept.iter().map(|&i| normals[i as usize]).collect(),
+            raw: kept.iter().map(|&i| raw[i as usize]).collect(),
+            spacing: *spacing,
+        };
+        let scene = Self {
+            surface,
+            surroundings: some(&self.surroundings),
+            raw: some(&self.raw),
+            unseen: some(&self.unseen),
+            obstacles: self.obstacles.clone(),
+        };
+        (scene, kept)
+    }
+
     /// The scene seen from another frame: everything moved by `pose`.
     #[must_use]
     pub fn transformed(&self, pose: &Isometry3<f64>) -> Self {

@@ -142,7 +142,7 @@ const REDUNDANCIES: usize = 12;
 /// How many of them must have a solution for a patch to count in full.
 const ROBUST: usize = 3;
 /// Cubes of which one point shows where the standing body may not be. \[m\]
-const OUTLINE: f64 = 0.04;
+pub(crate) const OUTLINE: f64 = 0.04;
 /// Space that the standing body keeps from what is there. \[m\]
 const BODY_SPACE: f64 = 0.03;
 /// Half of the width of a body that is only known by its meshes. \[m\]
@@ -259,7 +259,7 @@ fn centroid(points: &[Point3<f64>]) -> Point3<f64> {
 
 /// Axis-aligned boxes in the root frame around the shapes that do not move with the arm, and those of
 /// its first link, which turns in place.
-fn body_boxes(robot: &Robot, arm: &Arm) -> Vec<(Point3<f64>, Point3<f64>)> {
+pub(crate) fn body_boxes(robot: &Robot, arm: &Arm) -> Vec<(Point3<f64>, Point3<f64>)> {
     let mut poses = vec![Isometry3::identity(); robot.links().len()];
     arm.link_poses(&arm.home(), &mut poses);
     let mut boxes = Vec::new();
@@ -298,7 +298,7 @@ fn extent(link: &Isometry3<f64>, shape: &CollisionShape) -> Option<(Point3<f64>,
 }
 
 /// Whether one of the points is where the standing body would be.
-fn in_the_way(
+pub(crate) fn in_the_way(
     stance: &Stance,
     body: &[(Point3<f64>, Point3<f64>)],
     points: &[Point3<f64>],

@@ -125,6 +125,13 @@ const WITH_POSES: &[&str] = &[
     "tour", "motion", "fairing", "timing", "verify", "link", "poses",
 ];
 
+/// The same for those who make many plans of one scene.
+#[rustfmt::skip]
+const WITH_PIPELINE: &[&str] = &[
+    "progress", "cost", "workcell", "plan", "roadmap", "sweep",
+    "tour", "motion", "fairing", "timing", "verify", "link", "pipeline",
+];
+
 const PLANNER: &[(&str, &[&str])] = &[
     // 0
     ("progress", &[]),
@@ -149,6 +156,8 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("task", WITH_POSES),
     ("follow", WITH_POSES),
     ("transit", BELOW_4),
+    // 5: many plans
+    ("stops", WITH_PIPELINE),
 ];
 
 #[rustfmt::skip]

@@ -4,6 +4,7 @@ mod flight;
 mod headline;
 mod motion;
 mod points;
+mod program;
 mod recorded;
 mod robot;
 mod sitter;
@@ -17,6 +18,7 @@ use motion::motions;
 use points::Points;
 
 pub(super) use flight::Flight;
+pub(super) use program::of_program;
 pub(super) use recorded::recorded;
 pub(super) use robot::Posed;
 pub(super) use sitter::Sitter;
