@@ -138,7 +138,7 @@ fn curves_must_meet_in_velocity_too() {
         })
     };
     let why = only(&sim.offer(running_start(1, 1.0, None)), Rejected).why;
-    assert_eq!((why.reason, why.joint, why.value), (Reason::Start, 0, 1.0));
+    assert_eq!((why.reason, why.joint, why.value), (Reason::Speed, 0, 1.0));
     only(&sim.offer(cubic(&guard, 2, &points)), Accepted);
     only(&sim.offer(running_start(3, 0.5, Some(id(2)))), Rejected);
     only(&sim.offer(running_start(4, 1.0, Some(id(2)))), Accepted);
