@@ -11,14 +11,14 @@ use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
-use super::left_out::{Known, in_words, left_out};
+use super::left_out::{Known, LeftOut, in_words, left_out};
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
 use super::swept::{leave_out_swept, points_of, swept_before};
 use crate::cost;
 use crate::fairing::{Keep, fair};
 use crate::motion::Memo;
-use crate::plan::{Plan, Profile};
+use crate::plan::{Left, Plan, Profile};
 use crate::progress::Progress;
 use crate::roadmap::Graph;
 use crate::sweep::{Held, passes};
@@ -110,7 +110,7 @@ pub fn run(
     let best = search(&planning, patches, samples, &mut clock)?;
     let Attempt { patches, graph, sequence, mut plan, .. } = best;
     planning.leave(&mut plan);
-    let plan = moved(&planning, plan, rest, &mut clock);
+    let mut plan = moved(&planning, plan, rest, &mut clock);
 
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
@@ -124,6 +124,8 @@ pub fn run(
     };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
     let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
+    let of = |row: &LeftOut| Left { cause: row.cause.to_string(), points: row.points.clone() };
+    plan.left = left_out.iter().map(of).collect();
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {

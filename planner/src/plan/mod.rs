@@ -14,7 +14,7 @@ mod trajectory;
 
 pub use curve::Curve;
 pub use error::{FORMAT, PlanError};
-pub use file::{Continues, Held, Plan, Stretch, SurfaceSample};
+pub use file::{Continues, Held, Left, Plan, Stretch, SurfaceSample};
 pub use knot::PlanKnot;
 pub use seal::Seal;
 pub use settings::{BLEND_TOLERANCE, CostKind, LIFT, LINE_TOLERANCE, Method, Profile};
