@@ -197,7 +197,7 @@ fn doubt(path: &Path, scan: &RawScan, up: &UnitVector3<f64>, seed: u64, bars: &B
     let Some(lean) = room::lean(scan, up, seed) else { return };
     let told = |up: &UnitVector3<f64>| format!("{:.4},{:.4},{:.4}", up.x, up.y, up.z);
     bars.note(&format!(
-        "{}: by up {} no plane in it is level; the largest, {:.2} m² of it seen, leans by {:.0}\u{b0}: if \
+        "{}: by up {} no plane in it is level; the nearest to it, {:.2} m² of it seen, leans by {:.0}\u{b0}: if \
          things stand on it, say --up {}",
         path.display(),
         told(up),

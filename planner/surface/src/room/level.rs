@@ -96,21 +96,22 @@ pub struct Lean {
     pub up: UnitVector3<f64>,
 }
 
-/// Of the flat pieces of a scan that of which most was seen, where none is level by `up` to within 11°;
-/// `None` where one is, or where no piece is large enough to tell.
+/// Of the flat pieces of a scan that are large enough to tell, the one nearest to level by `up`, where none
+/// is level to within 11°.
 #[must_use]
 pub fn lean(raw: &RawScan, up: &UnitVector3<f64>, seed: u64) -> Option<Lean> {
     let noise = Noise { sensors: raw.sensor.into_iter().collect() };
     let (thin, side) = flat::thin(&raw.points);
     let flats = flat::find(&thin, side, &noise, seed);
     let large = || flats.iter().filter(|flat| flat.area >= AREA);
-    if large().any(|flat| flat.normal.dot(up).abs() > GIVEN.cos()) {
+    let level = |flat: &Flat| flat.normal.dot(up).abs();
+    let flat = large().max_by(|a, b| level(a).total_cmp(&level(b)))?;
+    if level(flat) > GIVEN.cos() {
         return None;
     }
-    let flat = large().max_by(|a, b| a.area.total_cmp(&b.area))?;
     let above = raw.sensor.map_or(up.into_inner(), |sensor| sensor - flat.centroid);
     let up_by_it = if flat.normal.dot(&above) < 0.0 { -flat.normal } else { flat.normal };
-    Some(Lean { angle: flat.normal.dot(up).abs().min(1.0).acos(), area: flat.area, up: up_by_it })
+    Some(Lean { angle: level(flat).min(1.0).acos(), area: flat.area, up: up_by_it })
 }
 
 /// The direction up of a camera that is held level, if all points lie in the field of view of one at
