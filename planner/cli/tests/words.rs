@@ -257,7 +257,8 @@ fn sample() -> tempfile::TempDir {
 #[test]
 fn a_path_is_followed_on_both_sides_of_what_stands_on_it() {
     let folder = sample();
-    let crate_ = "[[box]]\nname = \"crate\"\ncentre = [0.46, 0.0, 0.10]\nsize = [0.05, 0.10, 0.20]\n";
+    let crate_ =
+        "[[box]]\nname = \"crate\"\ncentre = [0.46, 0.0, 0.10]\nsize = [0.05, 0.10, 0.20]\n";
     std::fs::write(folder.path().join("crate.toml"), crate_).expect("written");
     let line = "follow paths/rows.csv --obstacles crate.toml --out f.json --json f.figures.json \
                 --report f.html";
@@ -311,4 +312,3 @@ fn a_cell_whose_endpoint_is_no_program_does_not_pass() {
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("cell.toml: [scene] up: [0.0, 0.0, 0.0] is no direction"), "{said}");
 }
-
