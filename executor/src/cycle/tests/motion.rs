@@ -171,6 +171,26 @@ fn stop_then_start_stops_where_it_was_predicted() {
 }
 
 #[test]
+fn a_plan_that_was_stopped_is_told_with_its_knot_until_another_one_begins() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let left = |sim: &Sim| (sim.state.snapshot().stopped, sim.state.snapshot().plan);
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(HOME)));
+    sim.run(150);
+    assert_eq!(left(&sim), (None, id(1)));
+    sim.order(Order::Stop);
+    sim.run_until(Mode::Hold, 110);
+    // At 0.2005 rad, knots are 0.05 rad apart.
+    assert_eq!(left(&sim), (Some(4), nullsweep_ipc_types::PlanId::NONE));
+    sim.run(500);
+    let at = moved(HOME, 0, 0.2005);
+    only(&sim.offer(plan(&guard, 2, JoinRule::StopThenStart, &line(at))), Accepted);
+    assert_eq!(left(&sim), (None, id(2)));
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(left(&sim), (None, nullsweep_ipc_types::PlanId::NONE), "it has come to its end");
+}
+
+#[test]
 fn plans_wait_in_line_and_the_newest_wins() {
     let mut sim = Sim::holding(pr2());
     let guard = sim.guard;
