@@ -181,13 +181,13 @@ fn a_plan_that_was_stopped_is_told_with_its_knot_until_another_one_begins() {
     sim.order(Order::Stop);
     sim.run_until(Mode::Hold, 110);
     // At 0.2005 rad, knots are 0.05 rad apart.
-    assert_eq!(left(&sim), (Some(4), nullsweep_ipc_types::PlanId::NONE));
+    assert_eq!(left(&sim), (Some(4), PlanId::NONE));
     sim.run(500);
     let at = moved(HOME, 0, 0.2005);
     only(&sim.offer(plan(&guard, 2, JoinRule::StopThenStart, &line(at))), Accepted);
     assert_eq!(left(&sim), (None, id(2)));
     sim.run_until(Mode::Hold, 1000);
-    assert_eq!(left(&sim), (None, nullsweep_ipc_types::PlanId::NONE), "it has come to its end");
+    assert_eq!(left(&sim), (None, PlanId::NONE), "it has come to its end");
 }
 
 #[test]
