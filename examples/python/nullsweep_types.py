@@ -260,15 +260,18 @@ class Telemetry(ctypes.Structure):
         ("fault", ctypes.c_uint32),
         ("knot", ctypes.c_uint32),
         ("unverified", ctypes.c_uint32),
+        ("stopped", ctypes.c_uint32),
+        ("held_count", ctypes.c_uint32),
         ("reserved", ctypes.c_uint32),
+        ("held_positions", ctypes.c_double * 32),
     ]
 
     @staticmethod
     def type_name():
-        return "nullsweep.Telemetry.v4"
+        return "nullsweep.Telemetry.v5"
 
 
-assert ctypes.sizeof(Telemetry) == 736
+assert ctypes.sizeof(Telemetry) == 1000
 
 
 class EventKind(enum.IntEnum):
@@ -312,6 +315,7 @@ class Reason(enum.IntEnum):
     GOAL = 21
     CORNER = 22
     JERK = 23
+    SPEED = 24
 
 
 _TEXTS[EventKind] = {
@@ -346,6 +350,7 @@ _TEXTS[Reason] = {
     Reason.GOAL: "the arm did not come to rest at the plan's end",
     Reason.CORNER: "a corner that the plan does not ask for",
     Reason.JERK: "above the jerk limit",
+    Reason.SPEED: "begins in motion, not at the arm's velocity",
 }
 
 
@@ -441,7 +446,7 @@ class Response(ctypes.Structure):
         ("fault", ctypes.c_uint32),
         ("knot", ctypes.c_uint32),
         ("unverified", ctypes.c_uint32),
-        ("reserved", ctypes.c_uint32),
+        ("stopped", ctypes.c_uint32),
     ]
 
     @staticmethod

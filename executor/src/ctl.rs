@@ -152,7 +152,24 @@ impl std::fmt::Display for Answer<'_> {
                 f.write_str(" (NOT VERIFIED)")?;
             }
         }
-        write!(f, ", speed {:.0} %", response.speed_scale * 100.0)
+        write!(f, ", speed {:.0} %", response.speed_scale * 100.0)?;
+        self.next(f)
+    }
+}
+
+impl Answer<'_> {
+    /// What leads on from a plan that was stopped, or is about to be.
+    fn next(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(asked, response) = self;
+        let disabling = *asked == CommandKind::StopAndDisable;
+        let stops = disabling || *asked == CommandKind::Stop;
+        if response.stopped != 0 {
+            write!(f, "; the last plan was left in knot {}", response.knot)?;
+        } else if !(stops && response.plan.is_some()) {
+            return Ok(());
+        }
+        let first = if disabling { "`executor ctl resume`, then " } else { "" };
+        write!(f, "; {first}`planner replan --running PLAN SCAN…` goes on with what it has left")
     }
 }
 
@@ -176,6 +193,30 @@ mod tests {
         assert_eq!(text, "executing, plan abc/2 at knot 3, speed 100 %");
         let text = said(CommandKind::Status, &Response { unverified: 1, ..verified });
         assert!(text.contains("plan abc/2 at knot 3 (NOT VERIFIED), speed"), "{text}");
+    }
+
+    #[test]
+    fn a_stop_says_what_leads_on() {
+        const LEADS: &str = "; `planner replan --running PLAN SCAN…` goes on with what it has left";
+        let plan = PlanId { epoch: 0xabc, number: 2 };
+        let stopping = Response {
+            plan,
+            mode: Mode::Stopping.wire(),
+            speed_scale: 1.0,
+            knot: 3,
+            ..Response::zeroed()
+        };
+        let text = said(CommandKind::Stop, &stopping);
+        let told = "stop: accepted; stopping on the path, plan abc/2 at knot 3, speed 100 %";
+        assert_eq!(text, format!("{told}{LEADS}"));
+        let text = said(CommandKind::StopAndDisable, &stopping);
+        assert!(text.contains("%; `executor ctl resume`, then `planner replan"), "{text}");
+        assert!(!said(CommandKind::Status, &stopping).contains("replan"), "it may be replaced");
+        let plan = PlanId::NONE;
+        let held = Response { plan, mode: Mode::Hold.wire(), stopped: 1, ..stopping };
+        let text = said(CommandKind::Status, &held);
+        let told = "holding, no plan runs, speed 100 %; the last plan was left in knot 3";
+        assert_eq!(text, format!("{told}{LEADS}"));
     }
 
     #[test]

@@ -168,9 +168,9 @@ fn response(verdict: Verdict, snapshot: Option<Snapshot>) -> Response {
         verdict: verdict.wire(),
         mode: snapshot.map_or(Mode::Init, |s| s.mode).wire(),
         fault: snapshot.map_or(Fault::None, |s| s.fault).wire(),
-        knot: snapshot.map_or(0, |s| s.knot),
+        knot: snapshot.map_or(0, |s| s.stopped.unwrap_or(s.knot)),
         unverified: u32::from(snapshot.is_some_and(|s| s.unverified)),
-        reserved: 0,
+        stopped: u32::from(snapshot.is_some_and(|s| s.stopped.is_some())),
     }
 }
 

@@ -165,7 +165,7 @@ pub fn run(arm: &Arm, config: &Config, alarm: &Alarm) -> Result<Summary, Executo
     let service = spawn("service", config, &signs, move |config, signs| {
         rt::raise(helper_priority(config));
         let ipc = open(config)?;
-        let journal = Journal::new(Words::of(&own, &config.robot_name, &config.guard));
+        let journal = Journal::new(Words::of(&own, &config.robot_name));
         let lost = config.lost_lines.clone();
         let service = Service::open(&ipc, service, own.dof(), journal, lost)?;
         signs.open.fetch_add(1, Ordering::Release);

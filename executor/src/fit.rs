@@ -55,7 +55,7 @@ impl Motion {
     fn meets(&self, after: &Self, guard: &Guard) -> Result<(), Rejection> {
         guard.matches_velocity(&self.v, &after.v).map_err(|(joint, step)| {
             let bound = guard.velocity_tolerance(joint);
-            Rejection::new(Reason::Start).knot(0).joint(joint).value(step, bound)
+            Rejection::new(Reason::Speed).knot(0).joint(joint).value(step, bound)
         })?;
         for j in 0..guard.used().len() {
             guard.allows_step(j, self.a[j], after.a[j]).map_err(|shown| {
@@ -133,7 +133,7 @@ impl Seam<'_> {
         if step <= bound {
             return Ok(());
         }
-        Err(Rejection::new(Reason::Start).knot(0).joint(j).value(step, bound))
+        Err(Rejection::new(Reason::Speed).knot(0).joint(j).value(step, bound))
     }
 
     /// When the running plan is left, on its own time. \[ns\]
@@ -159,8 +159,8 @@ impl Seam<'_> {
 /// Whether the plan's first knot is where the arm holds.
 ///
 /// # Errors
-/// [`Reason::Start`] with the joint and by how much it is off in place \[rad\] or velocity
-/// \[rad/s\], [`Reason::SoftLimit`] for a first knot too near a limit to be reached with the braking
+/// [`Reason::Start`] with the joint and by how much it is off in place \[rad\], [`Reason::Speed`] the
+/// same in velocity \[rad/s\], [`Reason::SoftLimit`] for a first knot too near a limit to be reached with the braking
 /// margin, [`Reason::Jerk`] where its acceleration begins with too large a step.
 pub fn starts_at(plan: &ValidPlan, holds: &JointVector, guard: &Guard) -> Result<(), Rejection> {
     let Some(first) = plan.knots().first() else { return Ok(()) };

@@ -131,9 +131,12 @@ impl Service {
             joint_count: self.joint_count.min(MAX_JOINTS) as u32,
             mode: snapshot.mode.wire(),
             fault: snapshot.fault.wire(),
-            knot: snapshot.knot,
+            knot: snapshot.stopped.unwrap_or(snapshot.knot),
             unverified: u32::from(snapshot.unverified),
+            stopped: u32::from(snapshot.stopped.is_some()),
+            held_count: report.held.count as u32,
             reserved: 0,
+            held_positions: report.held.positions,
         }
     }
 }

@@ -146,6 +146,8 @@ pub struct Report {
     pub stamp_ns: u64,
     /// The loop.
     pub snapshot: Snapshot,
+    /// Where the held joints were measured last.
+    pub held: Held,
     /// Wake-up lateness, see [`nullsweep_ipc_types::bucket_upper_ns`].
     pub lateness: [u32; HISTOGRAM_BUCKETS],
     /// Compute time a cycle.

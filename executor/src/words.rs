@@ -10,7 +10,6 @@ use nullsweep_robot::{Arm, JointKind};
 
 use crate::admit::Rejection;
 use crate::cycle::{Event, Snapshot};
-use crate::guard::Guard;
 
 /// A joint as people know it.
 #[derive(Clone, Debug)]
@@ -26,12 +25,10 @@ pub(crate) struct Words {
     robot: String,
     joints: Vec<Name>,
     held: Vec<Name>,
-    /// What a plan's velocity is compared with, for each joint. \[rad/s\] or \[m/s\]
-    velocity_tolerances: Vec<f64>,
 }
 
 impl Words {
-    pub(crate) fn of(arm: &Arm, robot: &str, guard: &Guard) -> Self {
+    pub(crate) fn of(arm: &Arm, robot: &str) -> Self {
         let unit = |turns: bool| if turns { "rad" } else { "m" };
         let joints = arm.joint_names().iter().enumerate();
         let joints =
@@ -42,12 +39,7 @@ impl Words {
         };
         let held = arm.held_joints().iter();
         let held = held.map(|h| Name { name: h.name.clone(), unit: unit(!slides(&h.name)) });
-        Self {
-            robot: robot.into(),
-            joints: joints.collect(),
-            held: held.collect(),
-            velocity_tolerances: (0..arm.dof()).map(|j| guard.velocity_tolerance(j)).collect(),
-        }
+        Self { robot: robot.into(), joints: joints.collect(), held: held.collect() }
     }
 
     /// What became of a plan.
@@ -87,9 +79,7 @@ impl Words {
         if value.is_nan() && bound.is_nan() {
             return text;
         }
-        let per_second = matches!(reason, Reason::Velocity | Reason::Corner)
-            || reason == Reason::Start
-                && self.velocity_tolerances.get(joint as usize) == Some(&bound);
+        let per_second = matches!(reason, Reason::Velocity | Reason::Corner | Reason::Speed);
         let unit = match reason {
             Reason::TimeOrder | Reason::Epoch => " ns".into(),
             _ if unit.is_empty() => String::new(),
@@ -102,7 +92,9 @@ impl Words {
             Reason::HeldJoint => {
                 write!(text, ": planned for {value:.4}{unit}, measured at {bound:.4}{unit}")
             }
-            Reason::Start => write!(text, ": {value:.6}{unit} off, at most {bound:.6}{unit}"),
+            Reason::Start | Reason::Speed => {
+                write!(text, ": {value:.6}{unit} off, at most {bound:.6}{unit}")
+            }
             Reason::Corner => {
                 write!(text, ": a step of {value:.4}{unit}, at most {bound:.4}{unit}")
             }
@@ -227,7 +219,11 @@ pub(crate) fn command(command: &Command, response: &Response) -> String {
 /// What to do about a plan that was refused or ended early.
 fn remedy(reason: Reason, kind: EventKind) -> &'static str {
     match reason {
-        Reason::None | Reason::Stopped | Reason::Shutdown => "",
+        Reason::None | Reason::Shutdown => "",
+        Reason::Stopped if kind == EventKind::Aborted => {
+            "`planner replan --running PLAN SCAN…` goes on with what it has left"
+        }
+        Reason::Stopped => "",
         Reason::Malformed => "its sender must be of this executor's version",
         Reason::Checksum => "publish it again, and let nobody write to it meanwhile",
         Reason::Robot => "plan with this executor's --urdf and arm",
@@ -250,6 +246,10 @@ fn remedy(reason: Reason, kind: EventKind) -> &'static str {
         Reason::Goal => "look what holds the arm; the bounds are --goal-tolerance and --goal-ms",
         Reason::Repeated => "nothing: the plan that came first counts; publish gives a new id",
         Reason::Start => "plan from where the arm holds (--start), or take the arm there first",
+        Reason::Speed => {
+            "it takes over from a plan that runs: `planner replan --running PLAN SCAN…` plans from where \
+             the arm stands"
+        }
         Reason::JoinPlan => "publish with --join stop, or continue the plan that runs",
         Reason::JoinKnot => "continue from a later knot (--continue PLAN@K)",
         Reason::NotReady => "`executor ctl status` says what is going on",
@@ -268,15 +268,14 @@ mod tests {
     use crate::JointVector;
     use crate::cycle::Refused;
 
-    fn words() -> (Words, Guard) {
+    fn words() -> Words {
         let arm = Robot::pr2().arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
-        let guard = Guard::new(arm.limits());
-        (Words::of(&arm, "pr2", &guard), guard)
+        Words::of(&arm, "pr2")
     }
 
     fn rejected(why: Rejection) -> String {
         let plan = PlanId { epoch: 3, number: 1 };
-        words().0.event(&Event { plan, kind: EventKind::Rejected, why })
+        words().event(&Event { plan, kind: EventKind::Rejected, why })
     }
 
     fn snapshot(mode: Mode, fault: Fault) -> Snapshot {
@@ -288,6 +287,7 @@ mod tests {
             plan: PlanId::NONE,
             unverified: false,
             knot: 0,
+            stopped: None,
             plan_time_ns: 0,
             rate: 0.0,
             scale: 1.0,
@@ -299,19 +299,18 @@ mod tests {
 
     #[test]
     fn a_rejection_names_joint_unit_and_remedy() {
-        let guard = words().1;
-        let start = Rejection::new(Reason::Start).knot(0).joint(0);
-        let text = rejected(start.value(0.35, guard.start_tolerance));
+        let off = |reason| rejected(Rejection::new(reason).knot(0).joint(0).value(0.35, 0.02));
+        let text = off(Reason::Start);
         assert!(
             text.contains("knot 0, joint r_shoulder_pan_joint: 0.350000 rad off, at"),
             "{text}"
         );
         assert!(text.contains("; plan from where the arm holds"), "{text}");
-        let text = rejected(start.value(0.35, guard.velocity_tolerance(0)));
-        assert!(text.contains("0.350000 rad/s off"), "{text}");
+        let text = off(Reason::Speed);
+        assert!(text.contains("0.350000 rad/s off") && text.contains("`planner replan"), "{text}");
         let text = rejected(Rejection::new(Reason::Velocity).knot(4).joint(1).value(3.0, 2.0));
         assert!(text.contains("r_shoulder_lift_joint: 3.0000 rad/s against the limit"), "{text}");
-        let torso = words().0.held.iter().position(|h| h.name == "torso_lift_joint");
+        let torso = words().held.iter().position(|h| h.name == "torso_lift_joint");
         let held = Rejection::new(Reason::HeldJoint).joint(torso.expect("a torso"));
         let text = rejected(held.value(0.3, 0.1));
         let told = "joint torso_lift_joint: planned for 0.3000 m, measured at 0.1000 m; move it";
@@ -321,7 +320,7 @@ mod tests {
     }
 
     fn held_count() -> f64 {
-        words().0.held.len() as f64
+        words().held.len() as f64
     }
 
     #[test]
@@ -331,7 +330,12 @@ mod tests {
             let silent = matches!(reason, Reason::None | Reason::Stopped | Reason::Shutdown);
             assert_eq!(text.contains(';'), !silent, "{text}");
         }
-        let words = words().0;
+        let words = words();
+        let plan = PlanId { epoch: 3, number: 1 };
+        let why = Rejection::new(Reason::Stopped).knot(270);
+        let text = words.event(&Event { plan, kind: EventKind::Aborted, why });
+        let told = "stopped by command, knot 270; `planner replan --running PLAN";
+        assert!(text.contains(told), "{text}");
         for fault in Fault::ALL {
             let text = words.fault(&snapshot(Mode::Fault, *fault));
             assert!(text.contains(fault.text()) && text.contains("; "), "{text}");

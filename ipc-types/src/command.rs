@@ -75,12 +75,13 @@ pub struct Response {
     pub mode: u32,
     /// The [`crate::Fault`] on the wire.
     pub fault: u32,
-    /// The knot whose segment is being executed.
+    /// The knot whose segment is being executed; that in which the last plan was left where `stopped`
+    /// says so.
     pub knot: u32,
     /// Non-zero: the plan in execution is one that its sender does not call verified, see
     /// [`crate::PlanHeader::verified`].
     pub unverified: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Non-zero: no plan runs, as the last one was ended before its end, in knot `knot`.
+    pub stopped: u32,
 }
 assert_layout!(Response, 56);

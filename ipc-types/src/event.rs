@@ -75,11 +75,13 @@ wire_enum! {
         Corner = 22 => "a corner that the plan does not ask for",
         /// A curve changes a joint's acceleration faster than its limit.
         Jerk = 23 => "above the jerk limit",
+        /// It begins where the arm is, but at another velocity: in motion where the arm rests, say.
+        Speed = 24 => "begins in motion, not at the arm's velocity",
     }
 }
 
 /// One step in the life of a plan. For a rejection, `joint`, `knot`, `value` and `bound` say
-/// where and by how much; for an acceptance, `value` is the time from the publication to the end
+/// where and by how much; for a plan that was aborted after it had begun, `knot` says where it was left; for an acceptance, `value` is the time from the publication to the end
 /// of the check, and `bound` how long the plan takes at full speed. \[s\]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]

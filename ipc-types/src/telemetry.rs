@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2_bb_derive_macros::ZeroCopySend;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
-use crate::{JointArray, PlanId, assert_layout, wire_enum};
+use crate::{JointArray, MAX_HELD_JOINTS, PlanId, assert_layout, wire_enum};
 
 wire_enum! {
     /// What the executor is doing.
@@ -76,7 +76,7 @@ pub const fn bucket_upper_ns(bucket: usize) -> u64 {
 /// A snapshot of the executor, about 100 Hz.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
-#[type_name("nullsweep.Telemetry.v4")]
+#[type_name("nullsweep.Telemetry.v5")]
 pub struct Telemetry {
     /// Rises by one each sample.
     pub sequence: u64,
@@ -111,12 +111,20 @@ pub struct Telemetry {
     pub mode: u32,
     /// A [`Fault`] on the wire.
     pub fault: u32,
-    /// The knot whose segment is being executed.
+    /// The knot whose segment is being executed; that in which the last plan was left where `stopped`
+    /// says so.
     pub knot: u32,
     /// Non-zero: the plan in execution is one that its sender does not call verified, see
     /// [`crate::PlanHeader::verified`].
     pub unverified: u32,
+    /// Non-zero: no plan runs, as the last one was ended before its end, in knot `knot`.
+    pub stopped: u32,
+    /// How many of `held_positions` are used; 0 before the first state.
+    pub held_count: u32,
     /// Zero.
     pub reserved: u32,
+    /// Newest measured positions of the joints that a plan takes as fixed, in the URDF's order. \[rad\]
+    /// or \[m\]
+    pub held_positions: [f64; MAX_HELD_JOINTS],
 }
-assert_layout!(Telemetry, 736);
+assert_layout!(Telemetry, 1000);

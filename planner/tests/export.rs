@@ -31,6 +31,7 @@ fn plan(profile: Profile) -> Plan {
         surface: Vec::new(),
         continues: None,
         past: Vec::new(),
+        left: Vec::new(),
         seal: None,
     }
 }

@@ -75,6 +75,7 @@ mod tests {
             surface,
             continues: None,
             past: Vec::new(),
+            left: Vec::new(),
             seal: None,
         }
     }

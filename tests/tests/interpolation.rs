@@ -50,6 +50,7 @@ fn plan(profile: Profile, knots: &[((JointVector, JointVector), u64)]) -> Plan {
         surface: Vec::new(),
         continues: None,
         past: Vec::new(),
+        left: Vec::new(),
         seal: None,
     }
 }

@@ -172,6 +172,8 @@ pub struct Snapshot {
     pub unverified: bool,
     /// Its knot.
     pub knot: u32,
+    /// The knot in which the last plan was ended before its end, while none runs.
+    pub stopped: Option<u32>,
     /// Time within it, 0 on the connector to its first knot. \[ns\]
     pub plan_time_ns: u64,
     /// Speed scale in force.

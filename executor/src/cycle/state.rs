@@ -70,6 +70,8 @@ pub struct State {
     pub(super) path: Option<Path>,
     /// Whether the path's plan still needs its end event; not while a fault brakes on it.
     pub(super) live: bool,
+    /// The knot in which the last plan was aborted, until another one begins.
+    pub(super) stopped: Option<u32>,
     /// While the arm is waited for at the path's end.
     pub(super) arrival: Option<Arrival>,
     pub(super) queue: Deque<Waiting, WAITING>,
@@ -96,6 +98,7 @@ impl Default for State {
             has_position: false,
             path: None,
             live: false,
+            stopped: None,
             arrival: None,
             queue: Deque::new(),
             stop: None,
@@ -123,6 +126,7 @@ impl State {
             plan: path.map_or(PlanId::NONE, |p| p.plan().id()),
             unverified: path.is_some_and(|p| !p.plan().is_verified()),
             knot: path.map_or(0, |p| small(p.knot())),
+            stopped: self.stopped.filter(|_| path.is_none()),
             plan_time_ns: path.map_or(0, |p| p.progress().time.max(0.0) as u64),
             rate: path.map_or(0.0, |p| p.progress().rate),
             scale: self.scale,
@@ -164,7 +168,10 @@ impl State {
     /// Tells the running plan's end. The path stays, to brake on.
     pub(super) fn end_path(&mut self, kind: EventKind, why: Reason, out: &mut Output) {
         if let Some(path) = self.path.as_ref().filter(|_| self.live) {
-            out.tell(path.plan().id(), kind, Rejection::new(why));
+            let (knot, why) = (path.knot(), Rejection::new(why));
+            let early = kind == EventKind::Aborted;
+            self.stopped = early.then(|| small(knot));
+            out.tell(path.plan().id(), kind, if early { why.knot(knot) } else { why });
         }
         self.live = false;
     }

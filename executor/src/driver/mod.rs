@@ -38,6 +38,8 @@ pub struct Driver<H> {
     tape: Option<Tape>,
     /// Where the held joints stood when the motion began.
     reference: Option<Held>,
+    /// Where they were measured last.
+    held: Held,
     lateness: [u32; HISTOGRAM_BUCKETS],
     compute: [u32; HISTOGRAM_BUCKETS],
     round_trip: [u32; HISTOGRAM_BUCKETS],
@@ -76,6 +78,7 @@ impl<H: Hardware> Driver<H> {
             alarm: Alarm::default(),
             tape: None,
             reference: None,
+            held: Held { positions: [0.0; MAX_HELD_JOINTS], count: 0 },
             lateness: [0; HISTOGRAM_BUCKETS],
             compute: [0; HISTOGRAM_BUCKETS],
             round_trip: [0; HISTOGRAM_BUCKETS],
@@ -177,6 +180,7 @@ impl<H: Hardware> Driver<H> {
         let tell_held = self.mode() == Mode::Init || self.cycles.is_multiple_of(REPORT_EVERY);
         let measured = states.as_ref().map(|states| {
             let held = held(states);
+            self.held = held;
             // Each cycle at first, so that the worker has them before anybody can have seen Hold.
             if tell_held {
                 // The worker sees that newer ones found no room.
@@ -231,6 +235,7 @@ impl<H: Hardware> Driver<H> {
         let report = Report {
             stamp_ns: self.stamp_ns,
             snapshot: self.state.snapshot(),
+            held: self.held,
             lateness: self.lateness,
             compute: self.compute,
             round_trip: self.round_trip,

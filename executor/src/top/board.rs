@@ -8,7 +8,6 @@ use nullsweep_robot::Arm;
 
 use crate::admit::Rejection;
 use crate::cycle;
-use crate::guard::Guard;
 use crate::words::Words;
 
 /// Plans whose lengths are kept.
@@ -72,7 +71,7 @@ impl Board {
         Self {
             robot: robot.into(),
             joints: (0..arm.dof()).map(joint).collect(),
-            words: Words::of(arm, robot, &Guard::new(arm.limits())),
+            words: Words::of(arm, robot),
             newest: None,
             log: VecDeque::with_capacity(LINES),
             answer: String::new(),

@@ -10,7 +10,7 @@ mod screen;
 mod tests;
 mod watch;
 
-use std::io;
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -42,6 +42,12 @@ pub(crate) struct TopArgs {
 
 /// Shows the executor's state until `q`.
 pub(crate) fn top(args: &TopArgs, arm: &Arm) -> io::Result<ExitCode> {
+    if !io::stdout().is_terminal() || !io::stdin().is_terminal() {
+        return Err(io::Error::other(
+            "top draws on a terminal and reads its keys, and here is none: `executor ctl status` tells \
+             mode and plan once",
+        ));
+    }
     let mut board = Board::new(&args.system.robot_name, arm);
     let mut watch = Watch::new(&args.system);
     let mut terminal = ratatui::try_init()?;

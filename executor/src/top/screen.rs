@@ -93,6 +93,8 @@ fn motion(t: &Telemetry, length: Option<f64>) -> Line<'static> {
             format!(" of {length:.2} s ({done:.0} %{left})")
         });
         format!("plan {}  knot {}  {seconds:.2} s{whole}", t.plan, t.knot)
+    } else if t.stopped != 0 {
+        format!("no plan; the last one was left in knot {}", t.knot)
     } else {
         "no plan".into()
     };

@@ -19,7 +19,7 @@ use nullsweep_surface::register::RegisterError;
 use nullsweep_surface::room::LevelError;
 use nullsweep_surface::scan::ScanWarning;
 
-use crate::send::Elsewhere;
+use crate::send::{Elsewhere, HeldElsewhere, Stopped};
 
 /// A line of advice for an error, where a flag can help: that of the outermost cause with any.
 pub(super) fn advice(error: &anyhow::Error) -> Option<String> {
@@ -39,20 +39,18 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         plan(error)
     } else if let Some(error) = error.downcast_ref() {
         publish(error)
-    } else if let Some(ReplanError::Publish(error)) = error.downcast_ref() {
-        publish(error)
-    } else if let Some(ReplanError::Ends { .. }) = error.downcast_ref() {
-        Some(
-            "a shorter --lead takes over sooner, and has the arm stopped where planning takes longer; or \
-             let the plan end and make another one"
-                .into(),
-        )
+    } else if let Some(error) = error.downcast_ref() {
+        replan(error)
     } else if let Some(error) = error.downcast_ref() {
         collision(error)
     } else if let Some(error) = error.downcast_ref() {
         Some(register(error).into())
     } else if let Some(error) = error.downcast_ref() {
         Some(elsewhere(error))
+    } else if let Some(error) = error.downcast_ref() {
+        Some(stopped(error))
+    } else if let Some(error) = error.downcast_ref() {
+        Some(held_elsewhere(error))
     } else if let Some(error) = error.downcast_ref() {
         transit(error)
     } else if let Some(error) = error.downcast_ref() {
@@ -183,7 +181,18 @@ fn publish(error: &PublishError) -> Option<String> {
         PublishError::ContinuesNothing => {
             "make the plan with `planner plan --continue PLAN@K`, or publish it with --join stop"
         }
-        PublishError::NothingRuns => "`planner publish --join stop` sends a plan to an idle arm",
+        PublishError::NothingRuns => {
+            "`planner publish --join stop` sends a plan to an idle arm; after a stop `planner replan \
+             --running PLAN` plans what it has left, from where the arm stands"
+        }
+        PublishError::EndedEarly(event) if event.reason == Reason::Stopped.wire() => {
+            "`planner replan --running PLAN SCAN…` goes on with what it has left, with the scans and \
+             their flags as they were given to `plan`"
+        }
+        PublishError::Rejected(event) if event.reason == Reason::Speed.wire() => {
+            "it takes over from a plan that runs; once that has ended or was stopped, `planner replan \
+             --running THAT` plans anew from where the arm stands"
+        }
         PublishError::EndedEarly(event) if event.reason == Reason::HeldJoint.wire() => {
             "keep torso and other arm still while the arm moves"
         }
@@ -208,8 +217,62 @@ fn publish(error: &PublishError) -> Option<String> {
     Some(text.into())
 }
 
+fn held_elsewhere(error: &HeldElsewhere) -> String {
+    let HeldElsewhere { joints, plan } = error;
+    let stand = joints.iter().map(|j| format!("--held {}={:.4}", j.name, j.stands));
+    let stand: Vec<String> = stand.collect();
+    let mock = plan.as_ref().map_or(String::new(), |plan| {
+        format!(" (`mock-hardware --plan {}` stands so)", plan.display())
+    });
+    format!(
+        "bring them there by the robot's own controls{mock}, or plan for where they stand: {}",
+        stand.join(" ")
+    )
+}
+
+fn stopped(error: &Stopped) -> String {
+    match &error.plan {
+        Some(plan) => format!(
+            "`planner replan --running {} SCAN…` goes on from where the arm stands with what is left, with \
+             the scans and their flags as they were given to `plan`",
+            plan.display()
+        ),
+        None => "`planner goto` again goes on from where the arm stands".into(),
+    }
+}
+
+fn replan(error: &ReplanError) -> Option<String> {
+    let text = match error {
+        ReplanError::Publish(error) => return publish(error),
+        ReplanError::Ends { .. } => {
+            "a shorter --lead takes over sooner, and has the arm stopped where planning takes longer; or \
+             let the plan end and make another one"
+        }
+        ReplanError::Idle => {
+            "`planner publish PLAN` runs a plan from its start; --from K goes on from where the arm \
+             stands with what the plan has not swept by its knot K"
+        }
+        ReplanError::Moved(_) => {
+            "--running names the plan that was stopped; --from K goes on from where the arm stands, \
+             wherever that is, with what the plan has not swept by its knot K"
+        }
+        ReplanError::OtherPlan(_) => "--running names the plan that runs: `executor ctl status`",
+        ReplanError::Runs => "leave out --from, or stop the arm first: `executor ctl stop`",
+        ReplanError::NotHeld(mode) => return posture(&PostureError::NotHeld(*mode)),
+        _ => return None,
+    };
+    Some(text.into())
+}
+
 fn elsewhere(error: &Elsewhere) -> String {
     let plan = error.plan.as_ref().map_or("PLAN".into(), |plan| plan.display().to_string());
+    if error.stopped {
+        return format!(
+            "`planner replan --running {plan} SCAN…` goes on from where the arm was stopped with what is \
+             left; `planner publish {plan} SCAN… --goto` begins anew, with the scans and their flags as \
+             they were given to `plan`"
+        );
+    }
     format!(
         "`planner goto --plan {plan} SCAN…` brings it there, with the scans and their flags as they \
          were given to `plan`; `planner publish {plan} SCAN… --goto` does both"

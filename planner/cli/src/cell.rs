@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
+use nullsweep_cell::{Cell, is_program, named_in};
 use nullsweep_collision::{ToolContact, World};
 use nullsweep_ipc_types::service::DEFAULT_ROBOT;
 use nullsweep_planner::progress::Progress;
@@ -64,9 +65,31 @@ pub(super) fn run(args: &CellArgs) -> anyhow::Result<u8> {
             let arm = args.arm(&robot, &args.robot.spec())?;
             let found = args.look(&robot, &arm)?;
             say_on!("{}", found.text);
-            Ok(if found.sound { OK } else { FAILED })
+            let endpoint = endpoint()?;
+            if let Some((told, _)) = &endpoint {
+                say!("  endpoint  {told}");
+            }
+            let there = endpoint.is_none_or(|(_, there)| there);
+            Ok(if found.sound && there { OK } else { FAILED })
         }
     }
+}
+
+/// The endpoint that the cell file names, if there is one, and whether it is a program.
+fn endpoint() -> anyhow::Result<Option<(String, bool)>> {
+    let mut args = std::env::args_os().collect();
+    let Some(file) = nullsweep_cell::take(&mut args) else { return Ok(None) };
+    let Some(command) = Cell::read(&file)?.endpoint else { return Ok(None) };
+    let Some(program) = command.first() else { return Ok(None) };
+    let there = is_program(&named_in(file.parent().unwrap_or(Path::new("")), program));
+    let told = match there {
+        true => command.join(" "),
+        false => format!(
+            "there is no program `{program}`, neither beside this one nor on the PATH; one with a path is \
+             looked for from the cell file's folder on"
+        ),
+    };
+    Ok(Some((told, there)))
 }
 
 fn init(args: &InitArgs) -> anyhow::Result<u8> {

@@ -8,7 +8,7 @@ use nullsweep_planner::workcell::stance::told;
 use nullsweep_report as report;
 
 use crate::numbers::percent;
-use crate::sheet::sheet;
+use crate::sheet::{folded, sheet};
 
 /// How the pad lies on the surface, and what the arm was held against, for people.
 pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
@@ -165,7 +165,7 @@ fn held_rows(held: &sweep::Held) -> Vec<[String; 2]> {
 
 pub(super) fn table(figures: &Figures) -> Table {
     let mut table = sheet(["figure", "value"]);
-    table.add_rows(rows(figures));
+    table.add_rows(rows(figures).into_iter().map(|[name, value]| [folded(&name), value]));
     table
 }
 

@@ -222,7 +222,6 @@ impl Drawn<'_> {
             scene: Some(&setting.scene),
             verification: Some(self.verification),
             flights: &[],
-            left_out: &[],
             tables: vec![report::Table {
                 title: "Figures".into(),
                 columns: vec!["figure".into(), "value".into()],

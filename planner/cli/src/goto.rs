@@ -81,6 +81,13 @@ pub(super) fn run(args: &GotoArgs) -> anyhow::Result<u8> {
     };
     let Some(found) = found else {
         say!("the arm is there already");
+        let in_motion = |plan: &&Plan| plan.knots.first().is_some_and(|k| k.v != JointVector::ZERO);
+        if let (None, Some(_)) = (&target, plan.as_ref().filter(in_motion)) {
+            say!(
+                "but the plan begins in motion, as it takes over from one that runs: once that was stopped, \
+                 `planner replan --running THAT SCAN…` plans anew from where the arm stands"
+            );
+        }
         return Ok(OK);
     };
     let now = resting(args.site.site(), &arm);

@@ -5,8 +5,10 @@ use std::time::Duration;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nullsweep_planner::plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::workcell::Stance;
+use nullsweep_robot::Arm;
 
 /// Any finite number.
 pub(super) fn finite(text: &str) -> Result<f64, String> {
@@ -93,6 +95,15 @@ impl FromStr for Held {
         let (name, value) = text.split_once('=').ok_or("NAME=VALUE is wanted")?;
         Ok(Self(name.into(), finite(value).map_err(|e| format!("`{value}`: {e}"))?))
     }
+}
+
+/// Those of a plan's held joints that stand elsewhere than an arm has them by itself.
+pub(super) fn moved(planned: &[plan::Held], arm: &Arm) -> Vec<(String, f64)> {
+    let by_itself = |name: &str| arm.held_joints().iter().find(|held| held.name == name);
+    let moved = planned.iter().filter(|held| {
+        by_itself(&held.name).is_none_or(|own| own.position.to_bits() != held.position.to_bits())
+    });
+    moved.map(|held| (held.name.clone(), held.position)).collect()
 }
 
 /// Positions of held joints as they were given, the last of a name holds: the PR2's torso by its own flag

@@ -166,7 +166,11 @@ fn together(
             if args.sensor_height.is_some() && first.sensor.is_none() {
                 note_unseen(path, "--sensor-height is", bars);
             }
-            (upright(args, stated)?, args.sensor_height.is_some())
+            let placement = upright(args, stated)?;
+            if let Placement::Up { up, .. } | Placement::UpAndHeight { up, .. } = &placement {
+                doubt(path, first, up, seed, bars);
+            }
+            (placement, args.sensor_height.is_some())
         }
     };
     // What is lowest of all files rests on the support.
@@ -186,6 +190,21 @@ fn together(
         bars.note(&format!("{path}: {below} points alone below all others: nothing rests on them"));
     }
     Ok((scan::place(whole, &placement).1, is_seen))
+}
+
+/// Tells where a scan shows large planes, and none that is level by what is taken to be up.
+fn doubt(path: &Path, scan: &RawScan, up: &UnitVector3<f64>, seed: u64, bars: &Bars) {
+    let Some(lean) = room::lean(scan, up, seed) else { return };
+    let told = |up: &UnitVector3<f64>| format!("{:.4},{:.4},{:.4}", up.x, up.y, up.z);
+    bars.note(&format!(
+        "{}: by up {} no plane in it is level; the nearest to it, {:.2} m² of it seen, leans by {:.0}\u{b0}: if \
+         things stand on it, say --up {}",
+        path.display(),
+        told(up),
+        lean.area,
+        lean.angle.to_degrees(),
+        told(&lean.up)
+    ));
 }
 
 /// The direction that `--up` gives.

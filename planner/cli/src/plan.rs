@@ -301,7 +301,6 @@ impl Made {
             collision: &self.collision,
             scene: Some(&self.scene),
             verification: Some(&figures.verification),
-            left_out: &figures.left_out,
             flights: &[],
             tables: vec![figures_table(figures)],
             lines: vec![report::LineSet {
@@ -354,7 +353,7 @@ fn job(
         (Some(after), _) => StanceChoice::Given(Stance {
             base: after.plan.base,
             height: after.plan.base_height,
-            held: after.plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
+            held: crate::numbers::moved(&after.plan.held, &arm),
         }),
         (None, Base::At(place)) => {
             place.tell(bars);

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Arg, Args, Command};
-use nullsweep_planner::link::publish::Join;
+use nullsweep_ipc_types::Reason;
+use nullsweep_planner::link::publish::{Join, PublishError};
 use nullsweep_planner::plan::Plan;
 use nullsweep_robot::Arm;
 
@@ -11,7 +12,7 @@ use crate::bars::Bars;
 use crate::choices::JoinArg;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::output::{complain, say, say_on};
-use crate::robot::RobotArgs;
+use crate::robot::{RobotArgs, differs};
 use crate::send::{SendArgs, interruption, outlook, resting};
 use crate::site::SiteArgs;
 use crate::way::{Broken, Found, Way, WayArgs};
@@ -88,7 +89,8 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     if let Some(first) = &first {
         args.send.send((&first.plan, None), arm.as_ref(), site, Join::Stop, true)?;
     }
-    args.send.send((&plan, Some(&args.plan)), arm.as_ref(), site, join, args.wait)?;
+    let sent = args.send.send((&plan, Some(&args.plan)), arm.as_ref(), site, join, args.wait);
+    sent.map_err(|error| args.other_robot(&plan, error))?;
     Ok(OK)
 }
 
@@ -105,6 +107,24 @@ impl PublishArgs {
         let held: Vec<_> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
         let arm = self.robot.arm().ok()?.with_held(&held).ok()?;
         (arm.fingerprint() == plan.fingerprint).then_some(arm)
+    }
+
+    /// Where the executor's robot is another one than the plan's, the error that says in what, as far as
+    /// that is known here.
+    fn other_robot(&self, plan: &Plan, error: anyhow::Error) -> anyhow::Error {
+        let rejected = error.downcast_ref().is_some_and(|error| {
+            matches!(error, PublishError::Rejected(why) if why.reason == Reason::Robot.wire())
+        });
+        let Some(arm) = self.robot.arm().ok().filter(|_| rejected) else { return error };
+        if arm.fingerprint() == plan.fingerprint {
+            return error.context(format!(
+                "the plan's robot is the one that is given here, {} with {} joints: it is the executor \
+                 that was started for another one, by --cell, --urdf or --arm",
+                plan.robot,
+                plan.joints.len()
+            ));
+        }
+        error.context(differs(plan, &arm))
     }
 
     /// The way to the plan's start, where one was asked for and is needed.

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use clap::Args;
 use nullsweep_ipc_types::PlanEvent;
-use nullsweep_planner::link::publish::{Patience, describe};
-use nullsweep_planner::link::replan::{Start, replan};
+use nullsweep_planner::link::publish::{Patience, describe_for};
+use nullsweep_planner::link::replan::{Request, Start, replan};
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
 
@@ -18,13 +18,20 @@ use crate::site::SiteArgs;
 
 #[derive(Debug, Args)]
 pub(super) struct ReplanArgs {
-    /// The plan file that is being executed.
+    /// The plan file that is being executed, or that was stopped: then the arm goes on from where it
+    /// stands.
     #[arg(long, value_name = "PLAN")]
     running: PathBuf,
     /// How long planning may take: the new plan begins in the first knot that is further ahead.
-    /// Where planning takes longer, the arm is stopped on its path and planned for from there. [s]
-    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds)]
-    lead: Duration,
+    /// Where planning takes longer, the arm is stopped on its path and planned for from there. Without
+    /// it 10 s, at most half of what is left to run, and where that is too short, once more for as long
+    /// as planning was found to take. [s]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    lead: Option<Duration>,
+    /// Where no plan runs, the knot up to which the plan counts as swept; without it the knot in which
+    /// the executor has stopped it.
+    #[arg(long, value_name = "K", conflicts_with = "lead")]
+    from: Option<usize>,
     #[command(flatten)]
     site: SiteArgs,
     /// Wait for the new plan's end as well.
@@ -51,14 +58,17 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
     let patience = Patience { admission: args.timeout, end };
     let site = args.site.site();
     let mut code = OK;
+    let mut passed = false;
     let mut from = |start: Start| {
+        let late = if passed { "the knot has passed: " } else { "" };
         let (knot, held) = match start {
             Start::Knot(knot) => {
-                tell!("planning from knot {knot} on, at most {} s", args.lead.as_secs_f64());
+                tell!("{late}planning from knot {knot} on, while the arm goes there");
+                passed = true;
                 (knot, None)
             }
             Start::Held { knot, at } => {
-                tell!("the knot has passed: the arm holds past knot {knot}, planning from there");
+                tell!("{late}the arm holds past knot {knot}, planning from there");
                 (knot, Some(at))
             }
         };
@@ -67,9 +77,11 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
         code = made;
         if code == VIOLATIONS { Err("it breaks a rule".to_owned()) } else { Ok(plan.sealed()) }
     };
-    let done = replan(site, &running, args.lead, patience, &mut from, &mut |event: &PlanEvent| {
-        tell!("{}", describe(event));
-    });
+    let request = Request { running: &running, lead: args.lead, from: args.from };
+    let mut told = |event: &PlanEvent| {
+        tell!("{}", describe_for(event, &running.joints, &running.held));
+    };
+    let done = replan(site, request, patience, &mut from, &mut told);
     match done {
         Ok(done) => say!("{done}"),
         Err(_) if code == VIOLATIONS => {}

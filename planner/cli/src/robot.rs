@@ -6,6 +6,7 @@ use std::str::FromStr;
 use anyhow::Context;
 use clap::Args;
 use nullsweep_collision::{MeshPaths, Options};
+use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
 
@@ -146,4 +147,23 @@ pub(super) fn tool_file(path: &Path) -> anyhow::Result<Tool> {
     let text =
         std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     toml::from_str(&text).with_context(|| format!("{}: not a tool", path.display()))
+}
+
+/// In what an arm is another one than a plan was made for.
+pub(super) fn differs(plan: &Plan, arm: &Arm) -> String {
+    let robot = arm.robot();
+    let given = robot.name();
+    if plan.joints == arm.joint_names() {
+        return format!(
+            "the plan was made for another {} than {given} is here: the joints have the same names, but \
+             their limits, axes or places are others, as after a change of the URDF",
+            plan.robot
+        );
+    }
+    format!(
+        "the plan moves {} of {}, the arm given is {} of {given}",
+        plan.joints.join(", "),
+        plan.robot,
+        arm.joint_names().join(", ")
+    )
 }

@@ -10,13 +10,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use nullsweep_collision::Margins;
 use nullsweep_ipc_types::{Mode, PlanEvent, Reason, Telemetry};
 use nullsweep_planner::link::Site;
-use nullsweep_planner::link::posture::{Posture, PostureError, posture, unit};
+use nullsweep_planner::link::posture::{Posture, PostureError, posture, unit, unit_of_held};
 use nullsweep_planner::link::publish::{
     Join, Patience, PublishError, Watcher, describe_for, publish,
 };
 use nullsweep_planner::plan::{Held, Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
-use nullsweep_robot::Arm;
+use nullsweep_robot::{Arm, wrap};
 
 use crate::numbers::seconds;
 use crate::output::tell;
@@ -37,6 +37,8 @@ pub(super) const LISTEN: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_secs(1);
 /// What an executor bridges by itself unless it is told otherwise. \[rad\] or \[m\]
 const BRIDGED: f64 = 0.02;
+/// How far a held joint may be unless an executor is told otherwise. \[rad\] or \[m\]
+const HELD: f64 = 0.002;
 /// A way to a plan's start that is worth a word. \[rad\] or \[m\]
 const WORTH: f64 = 0.001;
 
@@ -46,7 +48,50 @@ const WORTH: f64 = 0.001;
 pub(super) struct Elsewhere {
     /// Each joint that is too far away, and by how much.
     joints: Vec<String>,
+    /// Whether a plan was stopped on its way there.
+    pub(super) stopped: bool,
     /// The plan's file, if it has one.
+    pub(super) plan: Option<PathBuf>,
+}
+
+/// The plan was rejected because joints that it takes as fixed stand elsewhere.
+#[derive(Debug, thiserror::Error)]
+#[error("rejected: held joints are not where the plan has them: {}", .joints.iter().map(|j| j.told.as_str()).collect::<Vec<_>>().join(", "))]
+pub(super) struct HeldElsewhere {
+    pub(super) joints: Vec<HeldOff>,
+    pub(super) plan: Option<PathBuf>,
+}
+
+/// A held joint that stands elsewhere than a plan has it.
+#[derive(Debug)]
+pub(super) struct HeldOff {
+    pub(super) name: String,
+    /// Where it stands. \[rad\] or \[m\]
+    pub(super) stands: f64,
+    told: String,
+}
+
+/// The held joints that are farther from where a plan has them than an executor allows unless it is told
+/// otherwise.
+fn held_apart(plan: &Plan, arm: &Arm, now: &Posture) -> Vec<HeldOff> {
+    let both = plan.held.iter().zip(&now.held);
+    let off = both.filter_map(|(Held { name, position: planned }, &stands)| {
+        let unit = unit_of_held(arm, name);
+        let apart = if unit == "rad" { wrap(planned - stands) } else { planned - stands };
+        let told = format!(
+            "{name} by {apart:.3} {unit} (measured at {stands:.3}, planned for {planned:.3})"
+        );
+        (apart.abs() > HELD).then(|| HeldOff { name: name.clone(), stands, told })
+    });
+    off.collect()
+}
+
+/// An operator has stopped the plan on its way.
+#[derive(Debug, thiserror::Error)]
+#[error("ended early: {}", describe_for(.event, &[], &[]))]
+pub(super) struct Stopped {
+    event: Box<PlanEvent>,
+    /// The plan's file; none of a way to a posture.
     pub(super) plan: Option<PathBuf>,
 }
 
@@ -101,6 +146,18 @@ pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> 
         }
         if !apart(plan, arm, now, BRIDGED).is_empty() {
             line("", "farther than an executor goes by itself: --goto brings it there");
+            if let Some(knot) = now.stopped {
+                line(
+                    "",
+                    &format!("the last plan was stopped in knot {knot}: to go on with what it has"),
+                );
+                line("", "left, `planner replan --running PLAN SCAN…`");
+            }
+        }
+    }
+    if let (Some(arm), Some(now)) = (arm, now) {
+        for (i, off) in held_apart(plan, arm, now).iter().enumerate() {
+            line(if i == 0 { "held" } else { "" }, &format!("away: {}", off.told));
         }
     }
     // The margins are no choice of the command line.
@@ -152,7 +209,8 @@ impl SendArgs {
     /// Sends a plan, shows how far it is while its end is waited for, and tells what became of it.
     ///
     /// # Errors
-    /// As [`publish`]; [`Elsewhere`] where the arm is not where the plan starts.
+    /// As [`publish`]; [`Elsewhere`] where the arm is not where the plan starts, [`HeldElsewhere`] where
+    /// other joints are not, [`Stopped`] where an operator has stopped it.
     pub(super) fn send(
         &self,
         (plan, file): (&Plan, Option<&Path>),
@@ -174,10 +232,25 @@ impl SendArgs {
         {
             let joints = apart(plan, arm, &now, why.bound);
             if !joints.is_empty() {
-                return Err(Elsewhere { joints, plan: file.map(Path::to_path_buf) }.into());
+                let (stopped, plan) = (now.stopped.is_some(), file.map(Path::to_path_buf));
+                return Err(Elsewhere { joints, stopped, plan }.into());
             }
         }
-        Err(error.into())
+        if let (PublishError::Rejected(why), Some(arm)) = (&error, arm)
+            && Reason::from_wire(why.reason) == Some(Reason::HeldJoint)
+            && let Some(now) = resting(site, arm)
+        {
+            let joints = held_apart(plan, arm, &now);
+            if !joints.is_empty() {
+                return Err(HeldElsewhere { joints, plan: file.map(Path::to_path_buf) }.into());
+            }
+        }
+        match error {
+            PublishError::EndedEarly(event) if event.reason == Reason::Stopped.wire() => {
+                Err(Stopped { event, plan: file.map(Path::to_path_buf) }.into())
+            }
+            error => Err(error.into()),
+        }
     }
 }
 

@@ -189,7 +189,6 @@ impl Checked {
             collision: &self.collision,
             scene: Some(&self.scene),
             verification: Some(&self.verification),
-            left_out: &[],
             flights: &[],
             tables: vec![verified_table(&self.verification)],
             lines: Vec::new(),

@@ -19,7 +19,7 @@ use crate::figures::verified_table;
 use crate::output::{say, tell, writable};
 use crate::picture::{self, Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
-use crate::robot::{RobotArgs, tool_file};
+use crate::robot::{RobotArgs, differs, tool_file};
 use crate::scene::{Demo, SceneArgs, scene};
 use crate::scene_command;
 
@@ -173,7 +173,6 @@ fn of_plans(
         collision: &collision,
         scene: scene.as_ref(),
         verification: verification.as_ref(),
-        left_out: &[],
         flights: &flights,
         tables: verification.as_ref().map(verified_table).into_iter().collect(),
         lines: Vec::new(),
@@ -200,14 +199,7 @@ fn flight(file: &Path, arm: &Arm, tool: &Tool, plans: &[Plan]) -> anyhow::Result
 fn arm(args: &ViewArgs, robot: &Robot, plan: &Plan) -> anyhow::Result<Arm> {
     let arm = robot.arm(&args.robot.spec())?;
     if plan.fingerprint != arm.fingerprint() || plan.joints != arm.joint_names() {
-        bail!(
-            "the plan moves {} of {}, the arm given is {} of {}: say which one by --urdf and \
-             --arm BASE,TIP, or left",
-            plan.joints.join(", "),
-            plan.robot,
-            arm.joint_names().join(", "),
-            robot.name()
-        );
+        bail!("{}: say which one by --urdf and --arm BASE,TIP, or left", differs(plan, &arm));
     }
     let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
     Ok(arm.with_held(&held)?)

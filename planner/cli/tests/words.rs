@@ -240,3 +240,75 @@ fn a_closed_pipe_ends_it_without_a_word() {
         assert_eq!((output.status.code(), &*said), (Some(141), ""), "{args}");
     }
 }
+
+/// A copy of the sample's folder.
+fn sample() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/sample");
+    std::fs::create_dir(folder.path().join("paths")).expect("made");
+    for name in ["arm.urdf", "cell.toml", "sponge.toml", "paths/rows.csv"] {
+        std::fs::copy(from.join(name), folder.path().join(name)).expect(name);
+    }
+    folder
+}
+
+/// Three rows over a table, and a crate in the middle of them: whatever the arm meets by itself is met,
+/// past the crate, and the page says of the rest what the terminal says.
+#[test]
+fn a_path_is_followed_on_both_sides_of_what_stands_on_it() {
+    let folder = sample();
+    let crate_ =
+        "[[box]]\nname = \"crate\"\ncentre = [0.46, 0.0, 0.10]\nsize = [0.05, 0.10, 0.20]\n";
+    std::fs::write(folder.path().join("crate.toml"), crate_).expect("written");
+    let line = "follow paths/rows.csv --obstacles crate.toml --out f.json --json f.figures.json \
+                --report f.html";
+    let (code, _, said) = run(folder.path(), line);
+    assert_eq!(code, Some(0), "{said}");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect(name);
+    let figures: serde_json::Value = serde_json::from_str(&read("f.figures.json")).expect("JSON");
+    let plan = Plan::read(&folder.path().join("f.json")).expect("a plan");
+    let met = figures["met"].as_u64().expect("a count") as usize;
+    let left: usize = plan.left.iter().map(|left| left.points.len()).sum();
+    assert_eq!(met + left, 15);
+    assert!(met >= 12, "{met} of 15: {said}");
+    assert!(plan.left[0].cause.contains("from obstacle crate"), "{:?}", plan.left);
+    let page = read("f.html");
+    for left in &plan.left {
+        assert!(said.contains(&left.cause) && page.contains(&left.cause), "{}", left.cause);
+    }
+    assert!(page.contains(&format!("{met} of 15")) && page.contains("through 15 given poses"));
+    assert!(!page.contains("scanned points") && !page.contains("Tsp minimising"));
+}
+
+#[test]
+fn a_plan_that_is_given_as_a_path_is_told_as_that() {
+    let folder = tempfile::tempdir().expect("a folder");
+    long_plan(&folder.path().join("plan.json"));
+    let (code, _, said) = run(folder.path(), "follow plan.json");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("plan.json: it is a plan") && said.contains("planner publish"), "{said}");
+    std::fs::write(folder.path().join("scan.npy"), [0x93, b'N', 0xff, 0xfe]).expect("written");
+    for line in ["inspect scan.npy", "plan --demo chair-seat --tool scan.npy"] {
+        let (code, _, said) = run(folder.path(), line);
+        assert_ne!(code, Some(0), "{said}");
+        assert!(said.contains("scan.npy") && said.contains("text"), "{said}");
+        assert!(!said.contains("UTF-8"), "{said}");
+    }
+}
+
+#[test]
+fn a_cell_whose_endpoint_is_no_program_does_not_pass() {
+    let folder = sample();
+    let path = folder.path().join("cell.toml");
+    let cell = std::fs::read_to_string(&path).expect("read");
+    for (program, sound) in [("no-such-endpoint", false), ("sh", true), ("./arm.urdf", true)] {
+        std::fs::write(&path, cell.replace("mock-hardware", program)).expect("written");
+        let (code, out, said) = run(folder.path(), "cell check");
+        assert_eq!(code, Some(i32::from(!sound)), "{out}{said}");
+        assert_eq!(out.contains("there is no program `no-such-endpoint`"), !sound, "{out}");
+    }
+    std::fs::write(&path, cell.replace("[0.0, -0.5633, -0.8262]", "[0, 0, 0]")).expect("written");
+    let (code, _, said) = run(folder.path(), "cell check");
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("cell.toml: [scene] up: [0.0, 0.0, 0.0] is no direction"), "{said}");
+}

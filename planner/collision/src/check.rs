@@ -42,6 +42,12 @@ impl World {
         self.exact().first_hit(q, contact)
     }
 
+    /// All that is too near at a joint vector; of a part and the points only the first of them. Slow.
+    #[must_use]
+    pub fn hits(&self, q: &JointVector, contact: ToolContact) -> Vec<Hit> {
+        self.exact().hits(q, contact, usize::MAX)
+    }
+
     /// Whether all margins hold with the slack of each body added, the bodies standing at `poses`.
     pub(crate) fn are_clear(
         &self,

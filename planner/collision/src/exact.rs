@@ -97,24 +97,39 @@ impl Exact {
     /// The first pair found too near at the joint vector `q` \[rad\] or \[m\], moving parts only.
     #[must_use]
     pub fn first_hit(&self, q: &JointVector, contact: ToolContact) -> Option<Hit> {
+        self.hits(q, contact, 1).pop()
+    }
+
+    /// The first pairs found too near, at most so many; of a part and the points only the first of them.
+    #[must_use]
+    pub fn hits(&self, q: &JointVector, contact: ToolContact, most: usize) -> Vec<Hit> {
         let scene = &self.scene;
         let poses = poses(&scene.parts, scene.links, &self.arm, q);
         let bounds = self.bounds(&poses);
+        let moving: Vec<usize> = (0..poses.len()).filter(|&i| scene.moves[i]).collect();
+        let pairs = self.pair_hits(&poses, &bounds);
+        let obstacles = self.obstacle_hits(&poses, &bounds, &moving, true);
+        let points = self.point_hits(q, &poses, &bounds, &moving, contact);
+        pairs.chain(obstacles).chain(points).take(most).collect()
+    }
+
+    fn pair_hits(&self, poses: &[Pose], bounds: &[Aabb]) -> impl Iterator<Item = Hit> {
+        let scene = &self.scene;
         let margin = scene.margins.self_clearance;
-        for &(a, b) in &scene.pairs.checked {
+        scene.pairs.checked.iter().filter_map(move |&(a, b)| {
             if are_apart(&bounds[a], &bounds[b], margin) {
-                continue;
+                return None;
             }
             let (first, second) = (&scene.parts[a], &scene.parts[b]);
             let distance = distance(&poses[a], &*first.shape, &poses[b], &*second.shape);
-            if breaks(distance, margin) {
-                let with = With::Link(second.name.clone());
-                return Some(Hit { link: first.name.clone(), with, distance, margin });
-            }
-        }
-        let moving: Vec<usize> = (0..poses.len()).filter(|&i| scene.moves[i]).collect();
-        self.obstacle_hit(&poses, &bounds, &moving, true)
-            .or_else(|| self.point_hit(q, &poses, &bounds, &moving, contact))
+            let with = || With::Link(second.name.clone());
+            breaks(distance, margin).then(|| Hit {
+                link: first.name.clone(),
+                with: with(),
+                distance,
+                margin,
+            })
+        })
     }
 
     /// The axis-aligned bounds of each part.
@@ -132,59 +147,58 @@ impl Exact {
         let poses = poses(&scene.parts, scene.links, &self.arm, &q);
         let bounds = self.bounds(&poses);
         let fixed: Vec<usize> = (0..poses.len()).filter(|&i| !scene.moves[i]).collect();
-        self.obstacle_hit(&poses, &bounds, &fixed, false)
-            .or_else(|| self.point_hit(&q, &poses, &bounds, &fixed, ToolContact::Forbidden))
+        let points = self.point_hits(&q, &poses, &bounds, &fixed, ToolContact::Forbidden);
+        self.obstacle_hits(&poses, &bounds, &fixed, false).chain(points).next()
     }
 
-    fn obstacle_hit(
+    fn obstacle_hits(
         &self,
         poses: &[Pose],
         bounds: &[Aabb],
         parts: &[usize],
         with_floor: bool,
-    ) -> Option<Hit> {
+    ) -> impl Iterator<Item = Hit> {
         let scene = &self.scene;
         let margin = scene.margins.environment;
-        for (index, obstacle) in scene.obstacles.iter().enumerate() {
-            if obstacle.carries_robot && !with_floor {
-                continue;
-            }
+        let obstacles = scene.obstacles.iter().enumerate();
+        let looked = obstacles.filter(move |(_, obstacle)| with_floor || !obstacle.carries_robot);
+        looked.flat_map(move |(index, obstacle)| {
             let at = pose(&obstacle.pose);
             let around = obstacle.shape.compute_aabb(&at);
-            for &i in parts.iter().filter(|&&i| !scene.grounded.contains(&(i, index))) {
+            let free = move |&&i: &&usize| !scene.grounded.contains(&(i, index));
+            parts.iter().filter(free).filter_map(move |&i| {
                 if are_apart(&bounds[i], &around, margin) {
-                    continue;
+                    return None;
                 }
                 let shape = &*scene.parts[i].shape;
                 let distance = distance(&poses[i], shape, &at, &*obstacle.shape);
-                if breaks(distance, margin) {
+                breaks(distance, margin).then(|| {
                     let link = scene.parts[i].name.clone();
                     let with = With::Obstacle(obstacle.name.clone());
-                    return Some(Hit { link, with, distance, margin });
-                }
-            }
-        }
-        None
+                    Hit { link, with, distance, margin }
+                })
+            })
+        })
     }
 
-    fn point_hit(
+    fn point_hits(
         &self,
         q: &JointVector,
         poses: &[Pose],
         bounds: &[Aabb],
         parts: &[usize],
         contact: ToolContact,
-    ) -> Option<Hit> {
+    ) -> impl Iterator<Item = Hit> {
         let scene = &self.scene;
         let (tool, margins) = (&scene.tool, &scene.margins);
         let to_contact = (self.arm.tip_pose(q) * tool.contact_in_tip()).inverse();
-        let in_prism = |p: &Point3<f64>| {
+        let in_prism = move |p: &Point3<f64>| {
             let p = to_contact * p;
             p.x.abs() <= 0.5 * tool.width + margins.contact_growth
                 && p.y.abs() <= 0.5 * tool.length + margins.contact_growth
                 && (-tool.press_max..=margins.contact_front).contains(&p.z)
         };
-        for &i in parts {
+        parts.iter().filter_map(move |&i| {
             let may_touch = contact == ToolContact::Allowed && scene.at_tip[i];
             let is_pressed = may_touch && scene.parts[i].is_pad;
             let margin = match (may_touch, is_pressed) {
@@ -202,12 +216,11 @@ impl Exact {
                 let gives_way = is_pressed && (!scene.points.is_firm(index) || in_prism(p));
                 (breaks(distance, margin) && !gives_way).then_some((index, distance))
             });
-            if let Some((index, distance)) = hit {
+            hit.map(|(index, distance)| {
                 let link = scene.parts[i].name.clone();
-                return Some(Hit { link, with: scene.points.name(index), distance, margin });
-            }
-        }
-        None
+                Hit { link, with: scene.points.name(index), distance, margin }
+            })
+        })
     }
 }
 

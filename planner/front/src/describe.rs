@@ -6,11 +6,11 @@ use std::process::{Command, ExitCode, Stdio};
 use anyhow::{Context, ensure};
 use clap::CommandFactory;
 use clap_complete::Shell;
-use nullsweep_cell::{DESCRIBE, Described, FRONT, VARIABLE};
+use nullsweep_cell::{DESCRIBE, Described, FRONT, VARIABLE, beside};
 
 use crate::arguments::Cli;
 use crate::out::write_out;
-use crate::programs::{EXECUTOR, NAME, PLANNER, path, whole};
+use crate::programs::{EXECUTOR, NAME, PLANNER, whole};
 
 /// Writes what a shell completes by to standard output.
 ///
@@ -61,7 +61,7 @@ fn put(command: clap::Command, name: String, described: Described) -> clap::Comm
 }
 
 fn ask(program: &str) -> anyhow::Result<Described> {
-    let path = path(program);
+    let path = beside(program);
     let told = Command::new(&path)
         .arg(DESCRIBE)
         .env(VARIABLE, "")

@@ -6,10 +6,11 @@ use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Duration;
 
+use nullsweep_cell::beside;
 use rustix::process::{Resource, getrlimit};
 
 use crate::out::write_out;
-use crate::programs::{EXECUTOR, PLANNER, path, whole};
+use crate::programs::{EXECUTOR, PLANNER, whole};
 
 /// What was looked at.
 #[derive(Debug, PartialEq)]
@@ -197,7 +198,7 @@ fn versions() -> Finding {
     let programs = [PLANNER, EXECUTOR].into_iter().chain(whole().map(|(name, _)| name));
     let mut amiss = Vec::new();
     for program in programs {
-        let told = Command::new(path(program)).arg("--version").stdin(Stdio::null()).output();
+        let told = Command::new(beside(program)).arg("--version").stdin(Stdio::null()).output();
         match told {
             Ok(told) => {
                 let text = String::from_utf8_lossy(&told.stdout).trim().to_owned();

@@ -2,11 +2,11 @@
 
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
-use nullsweep_cell::{Cell, FILE_NAME, FRONT, PROGRAMS, VARIABLE};
+use nullsweep_cell::{Cell, FILE_NAME, FRONT, PROGRAMS, VARIABLE, beside, named_in};
 
 pub(crate) const PLANNER: &str = "planner";
 pub(crate) const EXECUTOR: &str = "executor";
@@ -17,12 +17,6 @@ pub(crate) const NAME: &str = "nullsweep";
 /// The programs whose whole command line is one command of this one, and that command.
 pub(crate) fn whole() -> impl Iterator<Item = (&'static str, &'static str)> {
     PROGRAMS.into_iter().filter(|(_, command)| !command.is_empty())
-}
-
-/// A program beside this one; else its name, to be found on the PATH.
-pub(crate) fn path(program: &str) -> PathBuf {
-    let beside = std::env::current_exe().ok().and_then(|own| Some(own.parent()?.join(program)));
-    beside.filter(|path| path.is_file()).unwrap_or_else(|| program.into())
 }
 
 /// Becomes a program, which speaks of it as a command of this one. `cell` is the file that was named
@@ -39,7 +33,7 @@ pub(crate) fn start(
     let shown = whole()
         .find(|(name, _)| *name == program)
         .map_or(NAME.into(), |(_, command)| format!("{NAME} {command}"));
-    let path = path(program);
+    let path = beside(program);
     let mut started = Command::new(&path);
     started.arg0(shown).env(FRONT, NAME).args(named(cell)).args(command).args(args);
     let error = started.exec();
@@ -77,8 +71,7 @@ pub(crate) fn start_endpoint(
     }) else {
         bail!("{} names no endpoint: endpoint = [\"mock-hardware\"] would", file.display());
     };
-    // A name is looked for beside this program and on the PATH, a path is from the cell's folder on.
-    let program = if program.contains('/') { folder.join(program) } else { path(&program) };
+    let program = named_in(folder, &program);
     let mut started = Command::new(&program);
     started.args(own).args(args).current_dir(folder).env(VARIABLE, &file).env(FRONT, NAME);
     let error = started.exec();

@@ -25,9 +25,13 @@ pub struct LeftPoint {
 }
 
 /// The points that are left as a list: the cause with most of them first, and of each the largest
-/// place first. `all` is how many points there are, swept and left.
+/// place first. `all` is how many points there are, swept and left, `things` what they are: points, poses.
 #[must_use]
-pub fn places(causes: &[String], left: &[LeftPoint], all: usize) -> Vec<PlaceGroup> {
+pub fn places(
+    causes: &[String],
+    left: &[LeftPoint],
+    (all, things): (usize, &str),
+) -> Vec<PlaceGroup> {
     let mut groups: Vec<(usize, PlaceGroup)> = Vec::new();
     for (cause, name) in causes.iter().enumerate() {
         let points: Vec<&LeftPoint> = left.iter().filter(|p| p.cause == cause).collect();
@@ -51,7 +55,7 @@ pub fn places(causes: &[String], left: &[LeftPoint], all: usize) -> Vec<PlaceGro
             );
             items.push(Place { label, normal: None, ..place(&all, 0.0) });
         }
-        let detail = format!("{} of all points", percent(share(points.len())));
+        let detail = format!("{} of all {things}", percent(share(points.len())));
         groups.push((points.len(), PlaceGroup { name: name.clone(), detail, items }));
     }
     groups.sort_by_key(|(points, _)| std::cmp::Reverse(*points));
@@ -119,7 +123,7 @@ mod tests {
         let causes = ["out of reach".to_owned(), "missed".to_owned(), "never".to_owned()];
         let left: Vec<LeftPoint> =
             row(0.0, 5, 1).chain(row(1.0, 20, 1)).chain(row(0.0, 4, 0)).collect();
-        let groups = places(&causes, &left, 58);
+        let groups = places(&causes, &left, (58, "points"));
         let names: Vec<&str> = groups.iter().map(|g| g.name.as_str()).collect();
         assert_eq!(names, ["missed", "out of reach"], "a cause of nothing is not told");
         assert_eq!(groups[0].items.len(), 2);
@@ -132,13 +136,13 @@ mod tests {
     #[test]
     fn many_places_end_in_one_line_for_the_rest() {
         let left: Vec<LeftPoint> = (0..40).flat_map(|i| row(f64::from(i), 2, 0)).collect();
-        let groups = places(&["missed".to_owned()], &left, 100);
+        let groups = places(&["missed".to_owned()], &left, (100, "points"));
         assert_eq!(groups[0].items.len(), MOST + 1);
         let rest = &groups[0].items[MOST];
         assert!(rest.label.starts_with("56.0 % in 28 smaller places"), "{}", rest.label);
         // A place of next to nothing is not told by itself.
         let speck: Vec<LeftPoint> = row(0.0, 2, 0).chain(row(5.0, 40, 0)).collect();
-        let groups = places(&["missed".to_owned()], &speck, 10_000);
+        let groups = places(&["missed".to_owned()], &speck, (10_000, "points"));
         let labels: Vec<&str> = groups[0].items.iter().map(|item| item.label.as_str()).collect();
         assert_eq!(labels.len(), 2);
         assert_eq!(labels[1], "under 0.1 % in 1 smaller place");

@@ -9,7 +9,7 @@ use super::labels::{Cost, Ends, Givens, HERE, Labels, Link};
 use super::layer::{COARSE, FINE, Layer, Node, extend};
 use super::problem::Problem;
 use super::station::{Station, apart};
-use crate::motion::{back_away, jump, reconfigure};
+use super::ways::Ways;
 use crate::poses::Point;
 
 /// Layers are about so many spacings of places apart.
@@ -17,10 +17,6 @@ const STRIDE: f64 = 4.0;
 /// How often the layers about a place that no way leads past are made denser before the posture is
 /// changed.
 const DENSER: usize = 2;
-/// Seeds by which a way through free space is looked for, and how many ways into a layer fail before no
-/// other is tried.
-const SEEDS: u64 = 3;
-const STRIKES: usize = 16;
 
 /// A part of what was found.
 #[derive(Clone, Debug)]
@@ -54,14 +50,11 @@ struct Ladder<'a> {
     layers: Vec<Layer>,
     links: Vec<Link>,
     tracks: HashMap<(Node, Node), Vec<Point>>,
-    ways: HashMap<Ends, Vec<JointVector>>,
-    blocked: HashSet<Ends>,
-    stuck: HashSet<Node>,
+    ways: Ways,
     /// Places that nothing was found for.
     dead: HashSet<(usize, usize)>,
-    /// How often the way into a layer was made denser, and how often no way was found into it.
+    /// How often the way into a layer was made denser.
     denser: HashMap<(usize, usize), usize>,
-    strikes: HashMap<(usize, usize), usize>,
     switches: bool,
 }
 
@@ -112,12 +105,9 @@ impl<'a> Ladder<'a> {
             links: Vec::new(),
             layers,
             tracks: HashMap::new(),
-            ways: HashMap::new(),
-            blocked: HashSet::new(),
-            stuck: HashSet::new(),
+            ways: Ways::new(problem),
             dead,
             denser: HashMap::new(),
-            strikes: HashMap::new(),
             switches: false,
         };
         ladder.links = (0..ladder.layers.len()).into_par_iter().map(|p| ladder.link(p)).collect();
@@ -130,8 +120,8 @@ impl<'a> Ladder<'a> {
             links: &self.links,
             start: self.problem.start.as_ref(),
             continuous: self.problem.cell.arm.continuous(),
-            blocked: &self.blocked,
-            stuck: &self.stuck,
+            blocked: &self.ways.blocked,
+            stuck: &self.ways.stuck,
             switches: self.switches,
         }
     }
@@ -246,44 +236,13 @@ impl<'a> Ladder<'a> {
     /// it fails.
     fn make_way(&mut self, step: Move) -> Option<usize> {
         let (p, (from, to)) = self.ends(step)?;
-        if self.ways.contains_key(&(from, to)) {
-            return None;
-        }
-        let cell = self.problem.cell;
         let goal = self.point(to).q;
         let start = match from {
             Some(from) => self.point(from).q,
             None => self.problem.start?,
         };
-        for (node, q) in [(from, start), (Some(to), goal)] {
-            if let Some(node) = node
-                && back_away(cell, &q).is_none()
-            {
-                self.stuck.insert(node);
-                return Some(p);
-            }
-        }
-        let seed = |k: u64| self.problem.seed.wrapping_add(k);
-        let found = (0..SEEDS).find_map(|k| match from {
-            Some(_) => reconfigure(cell, &start, &goal, seed(k)),
-            None => jump(cell, &start, &goal, seed(k)),
-        });
-        match found {
-            Some(path) => {
-                self.ways.insert((from, to), path);
-                None
-            }
-            None => {
-                self.blocked.insert((from, to));
-                let strikes = self.strikes.entry((to.0, to.1)).or_default();
-                *strikes += 1;
-                if *strikes >= STRIKES {
-                    let nodes = 0..self.layers[p].nodes.len();
-                    self.stuck.extend(nodes.map(|k| self.layers[p].node(k)));
-                }
-                Some(p)
-            }
-        }
+        let is_made = self.ways.make(self.problem, &self.layers, (from, &start), (to, &goal));
+        (!is_made).then_some(p)
     }
 
     /// The layer and the ends of a way through free space.
@@ -314,16 +273,7 @@ impl<'a> Ladder<'a> {
     /// changed.
     fn cut_off(&mut self, p: usize) -> usize {
         if !matches!(self.links[p], Link::Track(_)) {
-            // Through free space nothing comes there: the rest of the segment is left out.
-            let segment = self.layers[p].segment;
-            let behind =
-                self.layers[p..].iter().take_while(|layer| layer.segment == segment).count();
-            self.layers.drain(p..p + behind);
-            self.links.drain(p..p + behind);
-            if p < self.layers.len() {
-                self.links[p] = self.link(p);
-            }
-            return p;
+            return self.leave_out(p);
         }
         let key = (self.layers[p].segment, self.layers[p].station);
         let denser = self.denser.entry(key).or_default();
@@ -338,6 +288,21 @@ impl<'a> Ladder<'a> {
             None => self.links[p] = Link::Way { gap: true },
         }
         if self.switches { 0 } else { p.saturating_sub(1) }
+    }
+
+    /// Through free space nothing comes to a layer. It is left out where it is shut in itself; where only
+    /// the one before it is, from which nothing leads away, that one is. The first layer that changed.
+    fn leave_out(&mut self, p: usize) -> usize {
+        let [open, _] = self.ways.known(&self.layers[p]);
+        let shut = |before: &usize| self.ways.known(&self.layers[*before])[1];
+        let out = p.checked_sub(1).filter(|before| open && shut(before)).unwrap_or(p);
+        self.layers.remove(out);
+        self.links.remove(out);
+        let before = out.checked_sub(1).map(|before| self.layers[before].segment);
+        if let (Some(link), Some(layer)) = (self.links.get_mut(out), self.layers.get(out)) {
+            *link = Link::Way { gap: before == Some(layer.segment) };
+        }
+        out.saturating_sub(1)
     }
 
     /// A place in the middle between a layer and the one before it that may have joint vectors.
@@ -401,7 +366,7 @@ impl<'a> Ladder<'a> {
                 Move::Switch(..) => true,
                 Move::Way(p, ..) => matches!(self.links[p], Link::Way { gap: true }),
             };
-            if let Some(path) = self.ends(step).and_then(|(_, ends)| self.ways.remove(&ends)) {
+            if let Some(path) = self.ends(step).and_then(|(_, ends)| self.ways.take(&ends)) {
                 parts.push(Part::Way { path, reconfigures });
             }
             let (p, k) = match step {

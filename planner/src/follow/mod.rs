@@ -20,6 +20,7 @@ mod problem;
 mod run;
 mod smooth;
 mod station;
+mod ways;
 
 pub use config::FollowConfig;
 pub use error::FollowError;

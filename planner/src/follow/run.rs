@@ -14,9 +14,9 @@ use super::problem::Problem;
 use super::smooth::smooth;
 use super::station::{Station, stations};
 use crate::cost::{self, Effort};
-use crate::plan::Plan;
-use crate::poses::{self, Along, Piece, Point, Space, Standing, Stop, Unmet, tell_unmet};
-use crate::progress::{Progress, left_out};
+use crate::plan::{Left, Plan};
+use crate::poses::{self, Along, Piece, Point, Space, Standing, Stop, Unmet, by_reason, tell_left};
+use crate::progress::Progress;
 use crate::verify::{Given, Verification, verify};
 use crate::workcell::{Scene, Workcell};
 
@@ -67,12 +67,13 @@ pub fn run(
     }
     progress.stage("smoothing", None);
     let pieces = smoothed(&problem, &found);
-    tell(&problem.space, &poses, &pieces, progress);
+    let left = left(&problem.space, &poses, &pieces);
+    tell_left(&left, progress);
     let given = poses::Given { robot, arm: &arm, setup, poses: &poses };
     progress.stage("timing", None);
     let plan = poses::assemble(given, &pieces);
     let stops = ends(&plan);
-    let plan = setup.speed.set(plan, cell, &stops);
+    let plan = Plan { left, ..setup.speed.set(plan, cell, &stops) };
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));
@@ -152,8 +153,8 @@ fn dense(problem: &Problem<'_>, run: &[(Station, Point)]) -> Vec<Stop> {
     stops
 }
 
-/// Tells which poses are left out, and why.
-fn tell(space: &Space<'_>, poses: &[Isometry3<f64>], pieces: &[Piece], progress: &dyn Progress) {
+/// The poses that are left out, by cause.
+fn left(space: &Space<'_>, poses: &[Isometry3<f64>], pieces: &[Piece]) -> Vec<Left> {
     let mut met = vec![false; poses.len()];
     for piece in pieces {
         let Piece::Along(stops) = piece else { continue };
@@ -166,19 +167,18 @@ fn tell(space: &Space<'_>, poses: &[Isometry3<f64>], pieces: &[Piece], progress:
     for (pose, why) in whys {
         match why {
             Err(why) => unmet.push((pose, why)),
-            Ok(_) => apart.push(pose),
+            Ok(_) => apart.push(pose as u32),
         }
     }
-    tell_unmet(&unmet, progress);
+    let mut left = by_reason(&unmet);
     if !apart.is_empty() {
-        progress.note(&left_out(
-            ["pose", "poses"],
-            &apart,
-            "the arm meets it, but no way was found to follow the path there, nor a motion through free \
-             space to there",
-        ));
+        left.push(Left { cause: NO_WAY.into(), points: apart });
     }
+    left
 }
+
+const NO_WAY: &str = "the arm meets it, but no way was found to follow the path there, nor a motion through \
+                      free space to there";
 
 fn figures(
     space: &Space<'_>,

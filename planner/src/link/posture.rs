@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use nullsweep_ipc_types::ports::{Ipc, IpcError};
 use nullsweep_ipc_types::{JointArray, Mode};
-use nullsweep_robot::{Arm, JointVector, MAX_DOF};
+use nullsweep_robot::{Arm, Joint, JointKind, JointVector, MAX_DOF};
 
 use crate::link::publish::{PublishError, newest_telemetry};
 use crate::link::site::Site;
@@ -18,6 +18,10 @@ const NOTABLE: f64 = 0.02;
 pub struct Posture {
     /// Where the executor holds it, from where it begins every motion. \[rad\] or \[m\]
     pub q: JointVector,
+    /// The knot in which the last plan was ended before its end, if it was.
+    pub stopped: Option<usize>,
+    /// Where the held joints are measured, in the URDF's order. \[rad\] or \[m\]
+    pub held: Vec<f64>,
     /// What a user should know: joints that are measured elsewhere.
     pub notes: Vec<String>,
 }
@@ -66,7 +70,17 @@ pub fn posture(site: Site<'_>, arm: &Arm, patience: Duration) -> Result<Posture,
         let unit = unit(arm, j);
         format!("{name} is measured {:.3} {unit} from where it is held", apart.abs())
     });
-    Ok(Posture { q, notes: notes.collect() })
+    let stopped = (telemetry.stopped != 0).then_some(telemetry.knot as usize);
+    let held =
+        telemetry.held_positions.iter().take(telemetry.held_count as usize).copied().collect();
+    Ok(Posture { q, stopped, held, notes: notes.collect() })
+}
+
+/// What a held joint's position is counted in.
+#[must_use]
+pub fn unit_of_held(arm: &Arm, name: &str) -> &'static str {
+    let is = |j: &Joint| j.name == name && j.kind == JointKind::Prismatic;
+    if arm.robot().joints().iter().any(is) { "m" } else { "rad" }
 }
 
 /// What a joint's position is counted in.

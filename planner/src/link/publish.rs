@@ -212,7 +212,11 @@ pub fn describe_for(event: &PlanEvent, joints: &[String], held: &[Held]) -> Stri
         }
         return text;
     }
-    let (value, bound) = if of_held { ("planned for", "measured at") } else { ("value", "bound") };
+    let (value, bound) = match Reason::from_wire(event.reason) {
+        Some(Reason::HeldJoint) => ("planned for", "measured at"),
+        Some(Reason::Start | Reason::Speed) => ("off by", "at most"),
+        _ => ("value", "bound"),
+    };
     if event.value.is_finite() {
         text += &format!(", {value} {:.6}", event.value);
     }

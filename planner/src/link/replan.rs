@@ -1,5 +1,6 @@
 //! Going on under a new cost, speed or scan while a plan runs: from a knot far enough ahead that
-//! the new plan is made before the arm gets there, or else from where the arm is stopped.
+//! the new plan is made before the arm gets there, or else from where the arm is stopped. And going
+//! on after a stop, from where the arm is held.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -20,6 +21,28 @@ use crate::plan::Plan;
 const ON_PLAN: f64 = 0.05;
 /// How long the arm may take to come to rest.
 const STOP: Duration = Duration::from_secs(10);
+/// How long planning is taken to take where nobody says it, and the share of what is left to run that
+/// it is given at most.
+const LEAD: Duration = Duration::from_secs(10);
+const SHARE: f64 = 0.5;
+/// What planning once more is taken to take: so many times what it took, and so much more.
+const AGAIN: (f64, Duration) = (1.25, Duration::from_secs(1));
+/// How far on in its plan a stopped arm may be than it was told to be: a fault brakes on the path after
+/// its plan has ended.
+const BRAKING_NS: u64 = 2_000_000_000;
+
+/// What is to be replaced, and when.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// The plan that runs, or was stopped.
+    pub running: &'a Plan,
+    /// How long planning may take: where it takes longer, the arm is stopped. `None`: as long as it is
+    /// found to take.
+    pub lead: Option<Duration>,
+    /// Where no plan runs, the knot up to which the plan counts as swept; `None`: where the executor
+    /// has stopped it.
+    pub from: Option<usize>,
+}
 
 /// Where a new plan begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,8 +65,6 @@ pub struct Replanned {
     pub plan: PlanId,
     /// Where it began.
     pub start: Start,
-    /// Whether a plan from a knot came too late and the arm was stopped for the next one.
-    pub late: bool,
 }
 
 impl fmt::Display for Replanned {
@@ -55,6 +76,32 @@ impl fmt::Display for Replanned {
                 write!(f, "plan {plan} goes on from where the arm was stopped, past knot {knot}")
             }
         }
+    }
+}
+
+/// A joint that is not where a plan has it in the segment behind a knot. \[rad\] or \[m\]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Off {
+    /// Its name.
+    pub joint: String,
+    /// Where it is commanded.
+    pub commanded: f64,
+    /// The knot.
+    pub knot: usize,
+    /// Least position of the joint there.
+    pub low: f64,
+    /// Greatest position of the joint there.
+    pub high: f64,
+}
+
+impl fmt::Display for Off {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { joint, commanded, knot, low, high } = self;
+        let next = knot + 1;
+        write!(
+            f,
+            "{joint} is commanded to {commanded:.4}, knots {knot} and {next} have it in {low:.4} … {high:.4}"
+        )
     }
 }
 
@@ -70,22 +117,29 @@ pub enum ReplanError {
     /// A port failed.
     #[error("reading from the executor: {0}")]
     Port(#[from] PortError),
-    /// Another plan runs than the one that was given.
-    #[error(
-        "the executor does not run the plan that was given: {joint} is commanded to {commanded:.4}, knots {knot} and {} have it in {low:.4} … {high:.4}", .knot + 1
-    )]
-    OtherPlan {
-        /// The joint that is elsewhere.
-        joint: String,
-        /// Where it is commanded.
-        commanded: f64,
-        /// The knot whose segment is executed.
+    /// Nothing runs, and nothing was stopped.
+    #[error("the executor executes no plan, and has stopped none on its way")]
+    Idle,
+    /// No plan runs, and the arm is not at rest.
+    #[error("the arm is not at rest in the executor's hold: its mode is {}", .0.text())]
+    NotHeld(Mode),
+    /// A knot was given for a plan that runs.
+    #[error("the plan runs: where it has got to is the executor's to say")]
+    Runs,
+    /// The plan has no such knot.
+    #[error("the plan has knots 0 to {last}, not {knot}")]
+    NoSuchKnot {
+        /// The knot that was given.
         knot: usize,
-        /// Least position of the joint there.
-        low: f64,
-        /// Greatest position of the joint there.
-        high: f64,
+        /// The last one.
+        last: usize,
     },
+    /// The arm is not where the plan was stopped, or another plan was.
+    #[error("the arm is not where the plan that was given was stopped: {0}")]
+    Moved(Off),
+    /// Another plan runs than the one that was given.
+    #[error("the executor does not run the plan that was given: {0}")]
+    OtherPlan(Off),
     /// It ends before a new one could take over.
     #[error(
         "the running plan ends in {left:.1} s, before a new one that takes {lead:.1} s to make could \
@@ -108,50 +162,96 @@ pub enum ReplanError {
     Make(String),
 }
 
-/// Replaces the plan that runs by one that `make` makes from the start that it is given. `lead` is
-/// how long that may take; where it takes longer and the knot has passed, the arm is stopped on its
-/// path and `make` is called once more. `watcher` is told every event of the new plan.
+/// Replaces the plan that runs by one that `make` makes from the start that it is given. Where that
+/// takes longer than its lead and the knot has passed, `make` is called once more: for a knot that is
+/// far enough ahead by the time that it took, if no lead was asked for and there is one, else for
+/// where the arm is stopped on its path. An arm that was stopped before is planned for from where it
+/// is held. `watcher` is told every event of the new plan.
 ///
 /// # Errors
 /// See [`ReplanError`].
 pub fn replan(
     site: Site<'_>,
-    running: &Plan,
-    lead: Duration,
+    request: Request<'_>,
     patience: Patience,
     make: &mut dyn FnMut(Start) -> Result<Plan, String>,
     watcher: &mut dyn Watcher,
 ) -> Result<Replanned, ReplanError> {
+    let Request { running, lead, from } = request;
     let ipc = Ipc::open(site.robot, site.root)?;
     let telemetry = newest_telemetry(&ipc, patience.admission)?;
-    if !telemetry.plan.is_some() {
-        return Err(PublishError::NothingRuns.into());
-    }
-    runs(running, &telemetry.commanded, telemetry.knot)?;
     let old = telemetry.plan;
-    let knot = knot_ahead(running, telemetry.plan_time_ns, lead)?;
-    let plan = make(Start::Knot(knot)).map_err(ReplanError::Make)?;
-    // Whoever published another plan meanwhile wants that one.
-    let still = newest_telemetry(&ipc, patience.admission)?;
-    if still.plan == old {
-        match publish(&plan, site.robot, site.root, Join::Knot, patience, watcher) {
-            Ok(plan) => return Ok(Replanned { plan, start: Start::Knot(knot), late: false }),
-            Err(PublishError::NothingRuns) => {}
-            Err(PublishError::Rejected(why)) if is_late(&why) => {}
-            Err(error) => return Err(error.into()),
+    let start = if old.is_some() {
+        if from.is_some() {
+            return Err(ReplanError::Runs);
         }
-    } else if still.plan.is_some() {
-        runs(running, &still.commanded, still.knot)?;
-    }
-    let start = stop(&ipc, old, knot, patience.admission)?;
+        runs(running, &telemetry.commanded, telemetry.knot as usize)
+            .map_err(ReplanError::OtherPlan)?;
+        let left = running.duration() - telemetry.plan_time_ns as f64 * 1e-9;
+        let guess = LEAD.min(Duration::from_secs_f64((SHARE * left).max(0.0)));
+        let mut knot = knot_ahead(running, telemetry.plan_time_ns, lead.unwrap_or(guess))?;
+        let mut tries = if lead.is_some() { 1 } else { 2 };
+        loop {
+            let begun = Instant::now();
+            let plan = make(Start::Knot(knot)).map_err(ReplanError::Make)?;
+            let took = begun.elapsed();
+            // Whoever published another plan meanwhile wants that one.
+            let still = newest_telemetry(&ipc, patience.admission)?;
+            if still.plan == old {
+                match publish(&plan, site.robot, site.root, Join::Knot, patience, watcher) {
+                    Ok(plan) => return Ok(Replanned { plan, start: Start::Knot(knot) }),
+                    Err(PublishError::NothingRuns) => {}
+                    Err(PublishError::Rejected(why)) if is_late(&why) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            } else if still.plan.is_some() {
+                runs(running, &still.commanded, still.knot as usize)
+                    .map_err(ReplanError::OtherPlan)?;
+            }
+            tries -= 1;
+            let enough = took.mul_f64(AGAIN.0) + AGAIN.1;
+            match knot_ahead(running, still.plan_time_ns, enough) {
+                Ok(later) if tries > 0 && still.plan == old => knot = later,
+                _ => break stop(&ipc, old, knot, patience.admission)?,
+            }
+        }
+    } else {
+        held(running, &telemetry, from)?
+    };
     let plan = make(start).map_err(ReplanError::Make)?;
     let plan = publish(&plan, site.robot, site.root, Join::Stop, patience, watcher)?;
-    Ok(Replanned { plan, start, late: true })
+    Ok(Replanned { plan, start })
+}
+
+/// Where an arm goes on from that runs no plan: up to which knot it has come is asked for, or told by the
+/// executor that has stopped it; then the arm must be there.
+fn held(plan: &Plan, now: &Telemetry, from: Option<usize>) -> Result<Start, ReplanError> {
+    let mode = Mode::from_wire(now.mode).unwrap_or(Mode::Init);
+    if mode != Mode::Hold {
+        return Err(ReplanError::NotHeld(mode));
+    }
+    let mut at = JointVector::default();
+    at.copy_from_slice(&now.commanded[..MAX_DOF]);
+    let stopped = (now.stopped != 0).then_some(now.knot as usize);
+    let knot = from.or(stopped).ok_or(ReplanError::Idle)?;
+    let last = plan.knots.len().saturating_sub(1);
+    if knot > last {
+        return Err(ReplanError::NoSuchKnot { knot, last });
+    }
+    if from.is_some() {
+        return Ok(Start::Held { knot, at });
+    }
+    let end = plan.knots[knot].time_ns.saturating_add(BRAKING_NS);
+    let braked = plan.knots.partition_point(|k| k.time_ns <= end);
+    let there = (knot..braked).find(|k| runs(plan, &now.commanded, *k).is_ok());
+    let knot = there.unwrap_or(knot);
+    runs(plan, &now.commanded, knot).map_err(ReplanError::Moved)?;
+    Ok(Start::Held { knot, at })
 }
 
 /// Whether the arm is commanded to where this plan has it in this knot's segment.
-fn runs(plan: &Plan, at: &JointArray, knot: u32) -> Result<(), ReplanError> {
-    let knot = (knot as usize).min(plan.knots.len().saturating_sub(2));
+fn runs(plan: &Plan, at: &JointArray, knot: usize) -> Result<(), Off> {
+    let knot = knot.min(plan.knots.len().saturating_sub(2));
     let Some([a, b]) = plan.knots.get(knot..knot + 2) else { return Ok(()) };
     for (j, name) in plan.joints.iter().enumerate().take(MAX_DOF) {
         let (low, high) = (a.q[j].min(b.q[j]), a.q[j].max(b.q[j]));
@@ -160,7 +260,7 @@ fn runs(plan: &Plan, at: &JointArray, knot: u32) -> Result<(), ReplanError> {
         let commanded = at[j] - turns.round() * std::f64::consts::TAU;
         if !(low - ON_PLAN..=high + ON_PLAN).contains(&commanded) {
             let joint = name.clone();
-            return Err(ReplanError::OtherPlan { joint, commanded, knot, low, high });
+            return Err(Off { joint, commanded, knot, low, high });
         }
     }
     Ok(())
@@ -182,7 +282,7 @@ fn knot_ahead(plan: &Plan, time_ns: u64, lead: Duration) -> Result<usize, Replan
 fn is_late(why: &PlanEvent) -> bool {
     matches!(
         Reason::from_wire(why.reason),
-        Some(Reason::JoinKnot | Reason::JoinPlan | Reason::Start)
+        Some(Reason::JoinKnot | Reason::JoinPlan | Reason::Start | Reason::Speed)
     )
 }
 
@@ -273,6 +373,7 @@ mod tests {
             surface: Vec::new(),
             continues: None,
             past: Vec::new(),
+            left: Vec::new(),
             seal: None,
         }
     }
@@ -302,6 +403,39 @@ mod tests {
         at[0] += 3.0 * std::f64::consts::TAU;
         runs(&plan, &at, 3).expect("as far, whole turns on");
         let error = runs(&plan, &at, 7).expect_err("elsewhere");
-        assert!(matches!(error, ReplanError::OtherPlan { knot: 7, .. }), "{error}");
+        assert_eq!(error.knot, 7, "{error}");
+    }
+
+    #[test]
+    fn a_stopped_arm_goes_on_from_where_it_is_held() {
+        let plan = plan();
+        let stopped = |knot: u32, at: f64| {
+            let mut now = Telemetry {
+                mode: Mode::Hold.wire(),
+                stopped: 1,
+                knot,
+                ..bytemuck::Zeroable::zeroed()
+            };
+            now.commanded[0] = at;
+            now
+        };
+        let knot = |now: &Telemetry, from| match held(&plan, now, from) {
+            Ok(Start::Held { knot, at }) if at[0] == now.commanded[0] => Ok(knot),
+            Ok(start) => panic!("{start:?}"),
+            Err(error) => Err(error.to_string()),
+        };
+        assert_eq!(knot(&stopped(3, 0.35), None), Ok(3));
+        assert_eq!(knot(&stopped(3, 0.52), None), Ok(4), "a fault braked on its path");
+        let moved = knot(&stopped(3, 1.5), None).expect_err("it was moved away");
+        assert!(moved.contains("roll is commanded to 1.5000, knots 3 and 4"), "{moved}");
+        assert_eq!(knot(&stopped(3, 1.5), Some(3)), Ok(3), "as its user says");
+        let none = Telemetry { stopped: 0, ..stopped(0, 0.0) };
+        let idle = knot(&none, None).expect_err("nothing was stopped");
+        assert!(idle.contains("executes no plan"), "{idle}");
+        assert_eq!(knot(&none, Some(9)), Ok(9));
+        assert!(knot(&none, Some(10)).expect_err("too far").contains("knots 0 to 9, not 10"));
+        assert!(knot(&stopped(10, 0.9), None).expect_err("another plan").contains("not 10"));
+        let fault = Telemetry { mode: Mode::Fault.wire(), ..stopped(3, 0.35) };
+        assert!(knot(&fault, None).expect_err("a fault").contains("fault"));
     }
 }

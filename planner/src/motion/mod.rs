@@ -1,6 +1,7 @@
 //! The joint path through the tour's poses: tracked along the surface where that goes, else lifted
 //! off, through free space, and set down.
 
+mod hub;
 mod jump;
 pub mod layered;
 mod leg;
@@ -11,6 +12,7 @@ mod rrt_connect;
 #[cfg(test)]
 mod tests;
 
+pub use hub::{Hub, Spoke};
 pub use jump::{back_away, jump, reconfigure};
 pub use leg::Leg;
 pub use memo::Memo;

@@ -97,6 +97,21 @@ pub fn rrt_connect(
     None
 }
 
+/// A path on which the tool keeps its margin, with stretches replaced by straight lines where that is
+/// shorter and free.
+#[must_use]
+pub(super) fn shortened(
+    world: &World,
+    mut path: Vec<JointVector>,
+    options: &Options,
+    seed: u64,
+) -> Vec<JointVector> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let free = |a: &JointVector, b: &JointVector| world.motion_free(a, b, ToolContact::Forbidden);
+    shortcut(&mut path, options.shortcuts, &mut rng, free);
+    path
+}
+
 /// A tree of free configurations, each with the index of its parent (its own for the root).
 struct Tree {
     nodes: Vec<(JointVector, usize)>,

@@ -43,8 +43,9 @@ impl std::fmt::Display for LeftOut {
             n => write!(f, "{n} patches, {percent:.1} % of the surface"),
         }?;
         match (&self.cause, self.short) {
-            (Cause::Limit { .. }, Some([least, most])) => {
-                write!(f, ", by {} rad or m", span(least, most, 2))
+            (Cause::Limit { slides, .. }, Some([least, most])) => {
+                let unit = if *slides { "m" } else { "rad" };
+                write!(f, ", by {} {unit}", span(least, most, 2))
             }
             (_, Some([least, most])) => {
                 write!(f, ", short by {} mm", span(1e3 * least, 1e3 * most, 0))

@@ -12,13 +12,13 @@ use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
-use super::left_out::{Known, in_words, left_out};
+use super::left_out::{Known, LeftOut, in_words, left_out};
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
 use super::swept::{points_of, swept_before, without_swept};
 use crate::cost;
 use crate::motion::Memo;
-use crate::plan::Plan;
+use crate::plan::{Left, Plan};
 use crate::progress::Progress;
 use crate::roadmap::Graph;
 use crate::sweep::{Held, passes};
@@ -105,7 +105,7 @@ pub fn run(
         progress,
         memo: Memo::new(job.seed),
     };
-    let Made { attempt, plan } = made(&planning, patches, samples, rest.as_ref(), &mut clock)?;
+    let Made { attempt, mut plan } = made(&planning, patches, samples, rest.as_ref(), &mut clock)?;
     let Attempt { patches, graph, sequence, places, .. } = attempt;
 
     progress.stage("verify", Some(plan.knots.len()));
@@ -122,6 +122,8 @@ pub fn run(
     };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
     let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
+    let of = |row: &LeftOut| Left { cause: row.cause.to_string(), points: row.points.clone() };
+    plan.left = left_out.iter().map(of).collect();
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {

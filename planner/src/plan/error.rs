@@ -20,6 +20,12 @@ pub enum PlanError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// The file holds no text.
+    #[error("{path}: not a plan file, which is JSON: it holds no text")]
+    NoText {
+        /// Which file.
+        path: PathBuf,
+    },
     /// The file is not a plan.
     #[error("{path}: not a plan file: {source}")]
     Parse {

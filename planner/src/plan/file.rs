@@ -62,9 +62,22 @@ pub struct Plan {
     /// part up to where the next took over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub past: Vec<Stretch>,
+    /// What it leaves, by cause, as was found when it was made.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left: Vec<Left>,
     /// What it was like when it was verified, if it was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seal: Option<Seal>,
+}
+
+/// What one cause keeps a plan from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Left {
+    /// The cause, in words.
+    pub cause: String,
+    /// The points of the surface, or the given poses, by their index.
+    pub points: Vec<u32>,
 }
 
 /// A part of a plan that was followed.
@@ -163,6 +176,7 @@ impl Plan {
             surface: Vec::new(),
             continues: None,
             past: Vec::new(),
+            left: Vec::new(),
             seal: None,
         }
     }
@@ -172,8 +186,10 @@ impl Plan {
     /// # Errors
     /// Names the file and, for bad content, line and column.
     pub fn read(path: &Path) -> Result<Self, PlanError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| PlanError::File { path: path.into(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
+            std::io::ErrorKind::InvalidData => PlanError::NoText { path: path.into() },
+            _ => PlanError::File { path: path.into(), source },
+        })?;
         Self::parse(&text, path)
     }
 

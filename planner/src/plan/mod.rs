@@ -16,7 +16,7 @@ mod trajectory;
 
 pub use curve::Curve;
 pub use error::{FORMAT, PROGRAM_FORMAT, PlanError};
-pub use file::{Continues, Held, Plan, Stretch, SurfaceSample};
+pub use file::{Continues, Held, Left, Plan, Stretch, SurfaceSample};
 pub use knot::PlanKnot;
 pub use program::{Program, ProgramStop, Totals, Unswept, Work};
 pub use seal::Seal;

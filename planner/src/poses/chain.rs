@@ -3,7 +3,7 @@
 use nullsweep_robot::JointVector;
 
 use super::assemble::{Piece, Stop};
-use crate::motion::{back_away, jump, reconfigure};
+use crate::motion::{Hub, back_away, jump, reconfigure};
 use crate::workcell::Workcell;
 
 /// Seeds by which a way through free space is looked for.
@@ -40,6 +40,7 @@ pub(crate) fn chain(
     let mut chain = Chain { pieces: Vec::new(), left_out: Vec::new() };
     let mut open: Vec<usize> = (0..runs.len()).collect();
     let mut at = start.copied();
+    let hub = Hub::of(cell, start);
     while !open.is_empty() {
         let next = match order {
             Order::Kept => 1,
@@ -52,7 +53,7 @@ pub(crate) fn chain(
                 if back {
                     stops.reverse();
                 }
-                join(cell, &chain.pieces, at.as_ref(), stops, seed)
+                join((cell, hub.as_ref()), &chain.pieces, at.as_ref(), stops, seed)
             };
             backwards.iter().find_map(joined).map(|joined| (k, joined))
         });
@@ -93,7 +94,7 @@ impl Joined {
 
 /// The way from the end of the last piece, or from the start, to a run.
 fn join(
-    cell: Workcell<'_>,
+    (cell, hub): (Workcell<'_>, Option<&Hub>),
     pieces: &[Piece],
     at: Option<&JointVector>,
     stops: Vec<Stop>,
@@ -106,13 +107,27 @@ fn join(
     let ahead = stops[1..=entry].iter().rev().map(unmet);
     let stops: Vec<Stop> = ahead.chain(stops.iter().copied()).collect();
     let Some(Piece::Along(last)) = pieces.last() else {
-        let way = (0..TRIES).find_map(|k| jump(cell, at, &goal, seed.wrapping_add(k)))?;
+        let way = (0..TRIES).find_map(|k| jump(cell, at, &goal, seed.wrapping_add(k)));
+        let way = way.or_else(|| by_hub(cell, hub?, at, &goal, seed))?;
         return Some(Joined { back: Vec::new(), way: Some(way), stops });
     };
     let (exit, from) = lifts(cell, last.iter().rev())?;
-    let way = (0..TRIES).find_map(|k| reconfigure(cell, &from, &goal, seed.wrapping_add(k)))?;
+    let way = (0..TRIES).find_map(|k| reconfigure(cell, &from, &goal, seed.wrapping_add(k)));
+    let way = way.or_else(|| by_hub(cell, hub?, &from, &goal, seed))?;
     let back = last.iter().rev().skip(1).take(exit).map(unmet).collect();
     Some(Joined { back, way: Some(way), stops })
+}
+
+/// The way by way of a hub.
+fn by_hub(
+    cell: Workcell<'_>,
+    hub: &Hub,
+    from: &JointVector,
+    to: &JointVector,
+    seed: u64,
+) -> Option<Vec<JointVector>> {
+    let [from, to] = [hub.spoke(cell, from, seed)?, hub.spoke(cell, to, seed)?];
+    Some(from.to(&to, cell, seed))
 }
 
 /// The first of the stops where the tool comes off: how many are before it, and its joint vector.

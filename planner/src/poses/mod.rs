@@ -24,4 +24,4 @@ pub(crate) use setup::Standing;
 pub use setup::{Setup, SetupError};
 pub(crate) use space::{Point, Space};
 pub use tolerance::Tolerance;
-pub(crate) use unmet::{Unmet, tell_unmet};
+pub(crate) use unmet::{Unmet, by_reason, tell_left};

@@ -12,11 +12,11 @@ use super::figures::TaskFigures;
 use super::route::Route;
 use super::search::search;
 use crate::cost::{self, Effort};
-use crate::plan::Plan;
+use crate::plan::{Left, Plan};
 use crate::poses::{
-    self, Along, Chain, Order, Piece, Point, Space, Standing, Stop, chain, tell_unmet,
+    self, Along, Chain, Order, Piece, Point, Space, Standing, Stop, by_reason, chain, tell_left,
 };
-use crate::progress::{Progress, left_out};
+use crate::progress::Progress;
 use crate::verify::{Given, Verification, verify};
 use crate::workcell::{Scene, Workcell};
 
@@ -48,16 +48,19 @@ pub fn run(
     let Standing { arm, scene, world } = setup.stand(robot, scene)?;
     let space = Space::new(&arm, &world, &setup.tool, &setup.tolerance);
     let (route, unmet) = search(space, poses, config, progress)?;
-    tell_unmet(&unmet, progress);
+    let mut left = by_reason(&unmet);
+    tell_left(&left, progress);
     let cell = Workcell { arm: &arm, tool: &setup.tool, world: &world };
-    let pieces = connect(&space, cell, &route, config, progress)
+    let (pieces, apart) = connect(&space, cell, &route, config, progress)
         .ok_or(TaskError::NoWay { met: poses.len() - unmet.len() })?;
+    tell_left(&apart, progress);
+    left.extend(apart);
     let given = poses::Given { robot, arm: &arm, setup, poses };
     let plan = poses::assemble(given, &pieces);
     progress.stage("timing", None);
     let at_rest: Vec<usize> =
         (0..plan.knots.len()).filter(|&k| plan.knots[k].patch.is_some()).collect();
-    let plan = setup.speed.set(plan, cell, &at_rest);
+    let plan = Plan { left, ..setup.speed.set(plan, cell, &at_rest) };
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));
@@ -85,15 +88,15 @@ pub fn run(
     Ok(TaskOutcome { plan, figures, verification })
 }
 
-/// The way through the route, from the start on where there is one. What no way leads to is left out;
-/// `None` where that is all.
+/// The way through the route, from the start on where there is one, and what no way leads to; `None`
+/// where that is all.
 fn connect(
     space: &Space<'_>,
     cell: Workcell<'_>,
     route: &Route,
     config: &TaskConfig,
     progress: &dyn Progress,
-) -> Option<Vec<Piece>> {
+) -> Option<(Vec<Piece>, Vec<Left>)> {
     progress.stage("ways", None);
     let runs = runs(space, route);
     let (start, seed) = (config.setup.start.as_ref(), config.setup.seed);
@@ -114,22 +117,18 @@ fn connect(
             best = Chain { left_out: left, ..again };
         }
     }
-    let mut left: Vec<usize> =
-        best.left_out.iter().flat_map(|&run| &runs[run]).filter_map(|stop| stop.pose).collect();
-    left.sort_unstable();
+    let poses = best.left_out.iter().flat_map(|&run| &runs[run]).filter_map(|stop| stop.pose);
+    let mut points: Vec<u32> = poses.map(|pose| pose as u32).collect();
+    points.sort_unstable();
     if best.pieces.is_empty() {
         return None;
     }
-    if !left.is_empty() {
-        progress.note(&left_out(
-            ["pose", "poses"],
-            &left,
-            "no motion through free space was found to there from the other poses, or the tool does not come \
-             off there",
-        ));
-    }
-    Some(best.pieces)
+    let apart = (!points.is_empty()).then(|| Left { cause: APART.into(), points });
+    Some((best.pieces, apart.into_iter().collect()))
 }
+
+const APART: &str = "no motion through free space was found to there from the other poses, or the tool does \
+                     not come off there";
 
 /// The route in runs within which the arm goes from pose to pose without leaving its posture: free of
 /// collision, with what has to be put in so that the tool goes straight.

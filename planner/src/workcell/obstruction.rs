@@ -20,6 +20,9 @@ pub enum Cause {
     Limit {
         /// The joint.
         joint: String,
+        /// Whether it slides: its limits are in m, of others in rad.
+        #[serde(default)]
+        slides: bool,
     },
     /// The robot is in its own way.
     Itself {
@@ -61,7 +64,7 @@ impl std::fmt::Display for Cause {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::OutOfReach => f.write_str("out of the arm's reach"),
-            Self::Limit { joint } => write!(f, "{joint} would leave its limits"),
+            Self::Limit { joint, .. } => write!(f, "{joint} would leave its limits"),
             Self::Itself { link, other } => write!(f, "{link} meets {other}"),
             Self::Solid { link, name } => write!(f, "{link} meets the {name}"),
             Self::Object { link } => write!(f, "{link} meets the object"),
@@ -112,8 +115,10 @@ pub fn obstruction(cell: Workcell<'_>, patch: &Patch) -> Obstruction {
                 if beyond <= 0.0 {
                     inside.push(solution.q);
                 } else if outside.as_ref().is_none_or(|o| beyond < o.short) {
+                    let slides = !arm.is_revolute(joint);
                     let joint = arm.joint_names()[joint].clone();
-                    outside = Some(Obstruction { cause: Cause::Limit { joint }, short: beyond });
+                    let cause = Cause::Limit { joint, slides };
+                    outside = Some(Obstruction { cause, short: beyond });
                 }
             }
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitVector3, Vector3};
-use nullsweep_surface::room::{LevelError, PlaneKind, Room, level};
+use nullsweep_surface::room::{LevelError, PlaneKind, Room, lean, level};
 use nullsweep_surface::scan;
 use nullsweep_surface::{PlacedScan, Placement, RawScan, ReadOptions};
 use rand::{RngExt, SeedableRng};
@@ -59,6 +59,22 @@ fn seen(seed: u64) -> (RawScan, UnitVector3<f64>) {
         .collect();
     let raw = RawScan { points, ..RawScan::default() };
     (raw, UnitVector3::new_normalize(turn * Vector3::z()))
+}
+
+#[test]
+fn a_direction_that_no_plane_is_level_by_is_doubted() {
+    let (raw, up) = seen(1);
+    assert_eq!(lean(&raw, &up, 1), None);
+    let little = Rotation3::from_axis_angle(&Vector3::x_axis(), 0.1) * up;
+    assert_eq!(lean(&raw, &little, 1), None, "as exact as a hand-held level");
+    // About the axis that the camera looks along, so that the wall does not become level.
+    let wrong = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.6) * up;
+    let found = lean(&raw, &wrong, 1).expect("none is level by it");
+    assert!((found.angle - wrong.angle(&up)).abs() < 0.01, "{found:?}");
+    assert!(found.up.angle(&up) < 0.01 && found.area > 0.3, "{found:?}");
+    // A single thing without a plane tells nothing.
+    let points = raw.points.iter().take(40).copied().collect();
+    assert_eq!(lean(&RawScan { points, ..RawScan::default() }, &wrong, 1), None);
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub fn causes(error: &(dyn Error + 'static)) -> String {
         }
         cause = error.source();
     }
-    text
+    text.replace("stream did not contain valid UTF-8", "it is no text file")
 }
 
 #[cfg(test)]
@@ -39,5 +39,10 @@ mod tests {
         let source = std::io::Error::other("the disk is full");
         let error = Outermost { source: Outer { source } };
         assert_eq!(causes(&error), "no plan: cannot read it: the disk is full");
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("scan.npy");
+        std::fs::write(&path, [0x93, 0xff]).expect("written");
+        let source = std::fs::read_to_string(&path).expect_err("no text");
+        assert_eq!(causes(&Outer { source }), "cannot read it: it is no text file");
     }
 }

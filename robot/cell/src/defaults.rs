@@ -61,7 +61,7 @@ impl From<&Cell> for Defaults {
         put("v-max", number(cell.limits.v_max));
         put("profile", text(&cell.limits.profile));
         let scene = &cell.scene;
-        put("base", scene.base.map(|v| list(&v, ",")));
+        put("base", scene.base.as_ref().map(|v| list(v, ",")));
         put("up", scene.up.map(|v| list(&v, ",")));
         put("sensor-height", number(scene.sensor_height));
         put("support-height", number(scene.support_height));

@@ -1,5 +1,7 @@
 //! How a program is called by whoever reads what it says.
 
+use std::path::{Path, PathBuf};
+
 /// Names the program that started this one in its own place, as `nullsweep plan` starts `planner`: what
 /// is said then speaks of that one.
 pub const FRONT: &str = "NULLSWEEP_FRONT";
@@ -16,6 +18,31 @@ pub const PROGRAMS: [(&str, &str); 8] = [
     ("kills", "kills"),
     ("soak", "soak"),
 ];
+
+/// A program beside the one that runs; else its name, to be found on the PATH.
+#[must_use]
+pub fn beside(program: &str) -> PathBuf {
+    let own = std::env::current_exe().ok();
+    let beside = own.and_then(|own| Some(own.parent()?.join(program)));
+    beside.filter(|path| path.is_file()).unwrap_or_else(|| program.into())
+}
+
+/// The program that a cell file in `folder` names: a path is from that folder on, a name is looked for as
+/// [`beside`] does.
+#[must_use]
+pub fn named_in(folder: &Path, program: &str) -> PathBuf {
+    if program.contains('/') { folder.join(program) } else { beside(program) }
+}
+
+/// Whether there is such a program: a file, or a name that is found on the PATH.
+#[must_use]
+pub fn is_program(program: &Path) -> bool {
+    if program.components().count() > 1 {
+        return program.is_file();
+    }
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
+}
 
 /// A text with the front's name in place of those of the programs behind it, where a front has started
 /// this one: in commands (between backticks), and before a colon at the beginning.

@@ -15,5 +15,5 @@ pub use causes::causes;
 pub use defaults::{Defaults, FLAGS};
 pub use describe::{DESCRIBE, Described};
 pub use file::{Cell, CellError, FILE_NAME};
-pub use front::{FRONT, PROGRAMS, as_called};
+pub use front::{FRONT, PROGRAMS, as_called, beside, is_program, named_in};
 pub use parse::{VARIABLE, parse, parse_alone, take};

@@ -56,7 +56,7 @@ pub enum ArmError {
         joint: String,
     },
     /// A held joint that is not there.
-    #[error("{joint} is not held by this arm; held are: {}", known.join(", "))]
+    #[error("{joint} is not held by this arm; {}", held(known))]
     NotHeld {
         /// The joint.
         joint: String,
@@ -75,4 +75,12 @@ pub enum ArmError {
         /// Upper hard limit.
         upper: f64,
     },
+}
+
+/// Which joints an arm holds, in words.
+fn held(known: &[String]) -> String {
+    match known {
+        [] => "all joints of the robot are the arm's own, none is held".into(),
+        known => format!("held are: {}", known.join(", ")),
+    }
 }

@@ -53,6 +53,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         surface: vec![sample(0.0, true), sample(5.0, false)],
         continues: None,
         past: Vec::new(),
+        left: Vec::new(),
         seal: None,
     }
 }

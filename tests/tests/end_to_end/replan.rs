@@ -3,13 +3,14 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use nullsweep_ipc_types::{CommandKind, EventKind, PlanEvent, Reason, Telemetry, Verdict};
-use nullsweep_planner::plan::{Plan, PlanKnot};
+use nullsweep_ipc_types::{CommandKind, EventKind, Mode, PlanEvent, Reason, Telemetry, Verdict};
+use nullsweep_planner::plan::{Plan, PlanKnot, Stretch};
+use nullsweep_planner::sweep::coverage::swept_by;
 use nullsweep_tests::stage::{Part, Stage};
 use nullsweep_tests::system::System;
 use nullsweep_tests::witness::PATIENCE;
 
-use crate::common::{stage, verdict};
+use crate::common::{right_arm, stage, verdict};
 use crate::rig;
 
 /// A part of the simulated chair's seat: about 20 s of sweeping.
@@ -147,6 +148,66 @@ fn a_plan_that_comes_too_late_goes_on_from_where_the_arm_was_stopped() {
         assert!(swept.len() > 1, "too little was swept to tell: {swept:?}");
         assert!(swept.iter().all(|p| !again.contains(p)), "{swept:?} and again {again:?}");
     }
+    system.executor.terminate(PATIENCE).expect("it ends");
+    let found = verdict(&stage, &mut system.endpoint);
+    assert_eq!(found["violations"], 0, "{found:#}");
+}
+
+/// An operator stops a sweep in mid-motion: whatever is asked then says how to go on, and the rest is swept.
+#[test]
+fn a_stopped_sweep_goes_on_from_where_the_arm_stands() {
+    let stage = stage();
+    let path = stage.file("first.json");
+    let file = path.to_str().expect("UTF-8");
+    let place = ["--cost", "effort", "--base=-0.708,-0.004,1.047", "--torso", "0.2"];
+    let (code, said) = planner(&stage, "plan", &args("plan", &path, &place));
+    assert_eq!(code, Some(0), "{said}");
+    let mut system = rig::start(&stage, &["--plan", file]);
+    let publish = |more: &[&str]| -> Vec<OsString> {
+        let all = ["publish", file].into_iter().chain(more.iter().copied()).map(OsString::from);
+        all.chain(stage.place()).collect()
+    };
+    let sending = publish(&["--wait"]);
+    let mut sent = stage.start(Part::Planner, "sent", sending).expect("the planner starts");
+    let first = Plan::read(&path).expect("read");
+    let patches = (0..first.knots.len()).filter(|k| first.knots[*k].patch.is_some());
+    let some = patches.skip(5).min().expect("patches") as u32;
+    system.witness.see("some patches", |t| t.knot >= some).expect("it moves");
+    let answer = system.witness.command(CommandKind::Stop, 0.0).expect("an answer");
+    assert_eq!(answer.verdict, Verdict::Accepted.wire());
+
+    // Whoever waits for the plan's end is told, and so is whoever publishes it once more.
+    let leads = format!("planner replan --running {file} SCAN…");
+    let status = sent.wait(4 * PATIENCE).expect("known").expect("it ends");
+    let said = format!("{}{}", sent.stdout(), sent.stderr());
+    assert_eq!(status.code(), Some(1), "{said}");
+    assert!(said.contains("stopped by command, knot ") && said.contains(&leads), "{said}");
+    let held = system.witness.mode(Mode::Hold).expect("it holds");
+    assert!(held.stopped != 0 && held.knot >= some, "knot {} of {some}", held.knot);
+    let (code, said) = planner(&stage, "publish", &publish(&[]));
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains(&leads), "{said}");
+    let asked = system.witness.command(CommandKind::Status, 0.0).expect("an answer");
+    assert_eq!((asked.stopped, asked.knot), (1, held.knot));
+
+    let second = stage.file("second.json");
+    let more = ["--running", file, "--cost", "time", "--wait"];
+    let mut going = args("replan", &second, &more);
+    going.extend(stage.place());
+    let (code, said) = planner(&stage, "replan", &going);
+    assert_eq!(code, Some(0), "{said}");
+    let past = format!("the arm holds past knot {}, planning from there", held.knot);
+    assert!(said.contains(&past) && said.contains("finished"), "{said}");
+    let plan = Plan::read(&second).expect("read");
+    assert_eq!(plan.past[0].knots[..], first.knots[..=held.knot as usize]);
+    assert_eq!(plan.knots[0].q[..7], held.commanded[..7]);
+    let followed = plan.followed(plan.knots.len());
+    let stands: Vec<_> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
+    let arm = right_arm().with_held(&stands).expect("its joints");
+    let swept = swept_by(&plan.scan(), followed.iter().map(Stretch::trajectory), &arm);
+    let reachable = plan.surface.iter().filter(|s| s.reachable).count();
+    let hit = swept.iter().zip(&plan.surface).filter(|(swept, s)| **swept && s.reachable).count();
+    assert!(hit as f64 > 0.95 * reachable as f64, "{hit} of {reachable}");
     system.executor.terminate(PATIENCE).expect("it ends");
     let found = verdict(&stage, &mut system.endpoint);
     assert_eq!(found["violations"], 0, "{found:#}");

@@ -62,7 +62,7 @@ fn a_join_makes_no_step_that_a_curve_may_not() {
             only(&events, Accepted);
         } else {
             let why = only(&events, Rejected).why;
-            assert_eq!((why.reason, why.joint), (Reason::Start, 0), "{speed} at knot {at}");
+            assert_eq!((why.reason, why.joint), (Reason::Speed, 0), "{speed} at knot {at}");
             assert!(why.value > why.bound && why.bound <= 0.004 + 1e-12, "{why}");
         }
     }
@@ -136,12 +136,12 @@ fn without_leave_for_corners_a_straight_plan_begins_only_at_its_own_speed() {
             assert_eq!(sim.story(2), [Accepted, Started, Finished]);
         } else {
             let why = only(&event, Rejected).why;
-            assert_eq!((why.reason, why.joint), (Reason::Start, 0), "{why}");
+            assert_eq!((why.reason, why.joint), (Reason::Speed, 0), "{why}");
         }
     }
     let mut sim = Sim::new(guard);
     sim.stand_at(from);
-    assert_eq!(only(&sim.offer(coast(3, None)), Rejected).why.reason, Reason::Start);
+    assert_eq!(only(&sim.offer(coast(3, None)), Rejected).why.reason, Reason::Speed);
 }
 
 /// A first knot at a soft limit while the arm holds a little further inside: what the way there
@@ -354,7 +354,7 @@ fn corners_are_summed_over_the_cycle_across_a_join() {
     only(&sim.offer(first), Accepted);
     // In the seam, and half a cycle after it.
     let why = only(&sim.offer(stairs(2, at, 20, MS / 2, true)), Rejected).why;
-    assert_eq!((why.reason, why.joint), (Reason::Start, 0), "{why}");
+    assert_eq!((why.reason, why.joint), (Reason::Speed, 0), "{why}");
     // So many knots there that the loop would be long in summing them.
     let mut crowd = vec![(0, at)];
     crowd.extend((1..=12).map(|k| (k * MS / 20, moved(at, 0, 20.0 * step * 5e-5 * k as f64))));

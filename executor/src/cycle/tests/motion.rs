@@ -138,7 +138,7 @@ fn curves_must_meet_in_velocity_too() {
         })
     };
     let why = only(&sim.offer(running_start(1, 1.0, None)), Rejected).why;
-    assert_eq!((why.reason, why.joint, why.value), (Reason::Start, 0, 1.0));
+    assert_eq!((why.reason, why.joint, why.value), (Reason::Speed, 0, 1.0));
     only(&sim.offer(cubic(&guard, 2, &points)), Accepted);
     only(&sim.offer(running_start(3, 0.5, Some(id(2)))), Rejected);
     only(&sim.offer(running_start(4, 1.0, Some(id(2)))), Accepted);
@@ -168,6 +168,26 @@ fn stop_then_start_stops_where_it_was_predicted() {
     assert_eq!(sim.story(2), [Accepted, Started]);
     sim.run_until(Mode::Hold, 1000);
     assert_eq!(sim.last, Some(moved(stop, 0, 0.4)));
+}
+
+#[test]
+fn a_plan_that_was_stopped_is_told_with_its_knot_until_another_one_begins() {
+    let mut sim = Sim::holding(pr2());
+    let guard = sim.guard;
+    let left = |sim: &Sim| (sim.state.snapshot().stopped, sim.state.snapshot().plan);
+    sim.offer(plan(&guard, 1, JoinRule::StopThenStart, &line(HOME)));
+    sim.run(150);
+    assert_eq!(left(&sim), (None, id(1)));
+    sim.order(Order::Stop);
+    sim.run_until(Mode::Hold, 110);
+    // At 0.2005 rad, knots are 0.05 rad apart.
+    assert_eq!(left(&sim), (Some(4), PlanId::NONE));
+    sim.run(500);
+    let at = moved(HOME, 0, 0.2005);
+    only(&sim.offer(plan(&guard, 2, JoinRule::StopThenStart, &line(at))), Accepted);
+    assert_eq!(left(&sim), (None, id(2)));
+    sim.run_until(Mode::Hold, 1000);
+    assert_eq!(left(&sim), (None, PlanId::NONE), "it has come to its end");
 }
 
 #[test]

@@ -59,7 +59,8 @@ impl Flight {
         let span = Span::of(recording, plans)?;
         let inside: Vec<&CycleRecord> =
             recording.cycles.iter().filter(|cycle| span.holds(cycle)).collect();
-        let states = states(&inside, span.from_ns, arm)?;
+        let turned = Turned { arm, plans: if plans.is_empty() { &[] } else { &recording.plans } };
+        let states = states(&inside, span.from_ns, turned)?;
         let step = STEP.0.max(span.seconds() / MOST);
         let pad = tool.on(arm);
         let (mut joint, mut off) = (None::<(usize, f64, f64)>, None::<(f64, f64)>);
@@ -105,7 +106,7 @@ impl Flight {
         let targets: Vec<(f64, JointVector)> = inside
             .iter()
             .filter(|c| c.target.sequence > 0 && is_sound(&c.target.q))
-            .map(|c| (seconds(c.now_ns, span.from_ns), c.target.q))
+            .map(|c| (seconds(c.now_ns, span.from_ns), turned.target(c)))
             .collect();
         let targets = thinned(&targets, |t| t.0, step, |_| false);
         let probe = |t: &&(f64, JointVector)| Probe { time: t.0, pad: pad.centre(&t.1) };
@@ -221,11 +222,30 @@ fn start(recording: &Recording, plan: &RecordedPlan) -> Option<u64> {
     Some(passed.now_ns.saturating_sub(second as u64))
 }
 
+/// How whole turns of continuous joints are shown: an executor goes through a plan by the turns that are
+/// nearest to where the arm was.
+#[derive(Clone, Copy)]
+struct Turned<'a> {
+    arm: &'a Arm,
+    /// The plans by whose knots they are shown; none: as they were commanded.
+    plans: &'a [RecordedPlan],
+}
+
+impl Turned<'_> {
+    /// A cycle's setpoint.
+    fn target(&self, cycle: &CycleRecord) -> JointVector {
+        let target = &cycle.target;
+        let plan = self.plans.iter().find(|plan| plan.id == target.plan);
+        let knot = plan.and_then(|plan| plan.knots.get(target.knot as usize));
+        knot.map_or(target.q, |knot| self.arm.continuous().nearest_turn(&target.q, &knot.q))
+    }
+}
+
 /// States that came anew, in the order of their stamps, with the setpoints that they answer.
-fn states(cycles: &[&CycleRecord], from_ns: u64, arm: &Arm) -> anyhow::Result<Vec<State>> {
+fn states(cycles: &[&CycleRecord], from_ns: u64, turned: Turned<'_>) -> anyhow::Result<Vec<State>> {
     let mut setpoints: HashMap<u64, JointVector> = HashMap::with_capacity(cycles.len());
     let (mut states, mut newest) = (Vec::<State>::new(), from_ns);
-    let (continuous, dof) = (arm.continuous(), arm.dof());
+    let (continuous, dof) = (turned.arm.continuous(), turned.arm.dof());
     for cycle in cycles {
         let measured = &cycle.measured;
         let is_new = cycle.has_measured != 0 && measured.stamp_ns > newest;
@@ -237,14 +257,18 @@ fn states(cycles: &[&CycleRecord], from_ns: u64, arm: &Arm) -> anyhow::Result<Ve
                  one by --cell, or by --urdf and --arm BASE,TIP, or left"
             );
             let answers = setpoints.get(&measured.setpoint_sequence).copied();
-            // An endpoint may wrap its angles.
-            let near = answers.or(states.last().map(|s| s.q)).unwrap_or(measured.q);
+            // An endpoint may wrap its angles. Before the first answer the setpoint is as near.
+            let near = answers.unwrap_or_else(|| match states.last() {
+                Some(state) => state.q,
+                None if cycle.target.sequence > 0 => turned.target(cycle),
+                None => measured.q,
+            });
             let q = continuous.nearest_turn(&measured.q, &near);
             states.push(State { time: seconds(measured.stamp_ns, from_ns), q, answers });
             newest = measured.stamp_ns;
         }
         if cycle.target.sequence > 0 && is_sound(&cycle.target.q) {
-            setpoints.insert(cycle.target.sequence, cycle.target.q);
+            setpoints.insert(cycle.target.sequence, turned.target(cycle));
         }
     }
     Ok(states)

@@ -30,7 +30,16 @@ pub(super) fn headline(
         headline.push(Headline { label: label.into(), value, detail, tone });
     };
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let [of_reachable, of_all] = points.shares;
+    let [of_reachable, of_all] = if plan.is_of_poses() { [None; 2] } else { points.shares };
+    if plan.is_of_poses() {
+        let (met, all) = (points.all - points.left, points.all);
+        let tone = if met == all { Tone::Good } else { Tone::Warn };
+        let detail = match points.left {
+            0 => "of the given poses".into(),
+            left => format!("of the given poses; {left} left, by cause in the list"),
+        };
+        tell("Poses met", format!("{met} of {all}"), detail, tone);
+    }
     if let Some(share) = of_reachable {
         let tone = if share >= WELL { Tone::Good } else { Tone::Warn };
         tell(
@@ -65,7 +74,7 @@ pub(super) fn headline(
             tell("Largest deviation", value, detail, Tone::Plain);
         }
         let swept = measured_shares(plan, sitter.arm, flight);
-        if let [Some(of_reachable), Some(of_all)] = swept {
+        if let ([Some(of_reachable), Some(of_all)], false) = (swept, plan.is_of_poses()) {
             let detail = format!("of reachable, as measured; {} of all", percent(of_all));
             tell("Swept in fact", percent(of_reachable), detail, Tone::Plain);
         }

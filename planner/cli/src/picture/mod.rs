@@ -10,6 +10,7 @@ mod robot;
 mod sitter;
 
 use anyhow::ensure;
+use nullsweep_planner::plan::Plan;
 use nullsweep_report::{JointAxis, Motion, ReportData};
 use nullsweep_robot::Arm;
 
@@ -38,7 +39,7 @@ pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
         );
     }
     let here = sitter.scene.map(|scene| scene.transformed(&plan.base_pose().inverse()));
-    let points = Points::of(plan, sitter.arm, here.as_ref(), sitter.verification, sitter.left_out);
+    let points = Points::of(plan, sitter.arm, here.as_ref(), sitter.verification);
     let (tool, collision) = (&plan.tool, sitter.collision);
     let posed = Posed { robot: sitter.robot, arm: sitter.arm, tool, collision };
     let robot = robot::shapes(posed, here.as_ref())?;
@@ -47,15 +48,7 @@ pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
     let (headline, notes) = headline(&sitter, here.as_ref(), &points, &plans, &robot);
     Ok(ReportData {
         title: "Nullsweep coverage plan".into(),
-        subtitle: format!(
-            "{}, {} … {}, {:?} minimising {:?}, seed {}",
-            plan.robot,
-            plan.joints.first().map_or("", String::as_str),
-            plan.joints.last().map_or("", String::as_str),
-            plan.method,
-            plan.cost,
-            plan.seed
-        ),
+        subtitle: subtitle(plan),
         headline,
         notes,
         tables: sitter.tables,
@@ -70,6 +63,17 @@ pub(super) fn picture(sitter: Sitter<'_>) -> anyhow::Result<ReportData> {
         plans,
         measured,
     })
+}
+
+/// Which arm, and what it was planned by.
+fn subtitle(plan: &Plan) -> String {
+    let joint = |name: Option<&String>| name.map_or(String::new(), String::clone);
+    let (first, last) = (joint(plan.joints.first()), joint(plan.joints.last()));
+    let by = match plan.is_of_poses() {
+        true => format!("through {} given poses", plan.patches.len()),
+        false => format!("{:?} minimising {:?}", plan.method, plan.cost),
+    };
+    format!("{}, {first} … {last}, {by}, seed {}", plan.robot, plan.seed)
 }
 
 /// The arm's joints with their soft limits.

@@ -1,7 +1,6 @@
 //! The scan by what was swept, and what is left by cause and place.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use nullsweep_planner::pipeline::LeftOut;
 use nullsweep_planner::plan::{Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
 use nullsweep_planner::verify::Verification;
@@ -10,7 +9,7 @@ use nullsweep_report::{Cloud, LeftPoint, Paint, PlaceGroup, places};
 use nullsweep_robot::Arm;
 use nullsweep_surface::Scan;
 
-/// Why a point may be left, where a plan file is all that says it.
+/// Why a point may be left of which the plan does not say it.
 const CAUSES: [&str; 3] = [
     "no arm pose free of collision touches it",
     "reachable, but no motion was found that leads there",
@@ -36,10 +35,10 @@ impl Points {
         arm: &Arm,
         here: Option<&Scene>,
         verification: Option<&Verification>,
-        left_out: &[LeftOut],
     ) -> Self {
         let scan = surface(plan);
         let swept = match verification {
+            _ if plan.is_of_poses() => met(plan),
             Some(found) if found.swept.len() == scan.points.len() => found.swept.clone(),
             _ => {
                 let past = plan.past.iter().map(Stretch::trajectory);
@@ -51,17 +50,11 @@ impl Points {
             normal: scan.normals[i],
             cause,
         };
-        let (causes, left): (Vec<String>, Vec<LeftPoint>) = if left_out.is_empty() {
-            let cause = causes(plan);
-            let points = (0..swept.len()).filter(|i| !swept[*i]).map(|i| left(i, cause(i)));
-            (CAUSES.map(str::to_owned).into(), points.collect())
-        } else {
-            let of = |(cause, all): (usize, &LeftOut)| {
-                all.points.iter().map(move |i| (*i as usize, cause)).collect::<Vec<_>>()
-            };
-            let points = left_out.iter().enumerate().flat_map(of).map(|(i, cause)| left(i, cause));
-            (left_out.iter().map(|l| l.cause.to_string()).collect(), points.collect())
-        };
+        let told = plan.left.iter().map(|left| left.cause.clone());
+        let names: Vec<String> = told.chain(CAUSES.map(str::to_owned)).collect();
+        let cause = causes(plan);
+        let points = (0..swept.len()).filter(|i| !swept[*i]);
+        let left: Vec<LeftPoint> = points.map(|i| left(i, cause(i))).collect();
         let some = |want: bool| {
             let all = scan.points.iter().zip(&swept);
             all.filter(|(_, s)| **s == want).map(|(p, _)| *p).collect()
@@ -72,8 +65,10 @@ impl Points {
             points,
             shown: true,
         };
+        let (done, things) =
+            if plan.is_of_poses() { ("met", "poses") } else { ("swept", "points") };
         let mut clouds =
-            vec![cloud("swept", Paint::Swept, some(true)), cloud("left", Paint::Left, some(false))];
+            vec![cloud(done, Paint::Swept, some(true)), cloud("left", Paint::Left, some(false))];
         if let Some(scene) = here {
             clouds.push(cloud("around", Paint::Around, scene.surroundings.clone()));
             let unseen = cloud("unseen space", Paint::Unseen, scene.unseen.clone());
@@ -81,7 +76,7 @@ impl Points {
         }
         Self {
             clouds,
-            places: places(&causes, &left, swept.len()),
+            places: places(&names, &left, (swept.len(), things)),
             all: swept.len(),
             left: left.len(),
             shares: shares(plan, &swept),
@@ -110,8 +105,29 @@ pub(super) fn surface(plan: &Plan) -> Scan {
     }
 }
 
-/// For a point of a plan that is left: which of [`CAUSES`].
+/// Which of the given poses a plan meets.
+fn met(plan: &Plan) -> Vec<bool> {
+    let mut met = vec![false; plan.patches.len()];
+    for pose in plan.knots.iter().filter_map(|knot| knot.patch) {
+        if let Some(met) = met.get_mut(pose as usize) {
+            *met = true;
+        }
+    }
+    met
+}
+
+/// For a point of a plan that is left: which of the causes that the plan tells, and of [`CAUSES`] behind
+/// them.
 fn causes(plan: &Plan) -> impl Fn(usize) -> usize {
+    let mut told = vec![None; plan.surface.len()];
+    for (cause, left) in plan.left.iter().enumerate() {
+        for point in &left.points {
+            if let Some(told) = told.get_mut(*point as usize) {
+                *told = Some(cause);
+            }
+        }
+    }
+    let others = plan.left.len();
     let mut visited = vec![false; plan.patches.len()];
     let stretches = plan.past.iter().map(|s| &s.knots).chain([&plan.knots]);
     for patch in stretches.flatten().filter_map(|knot| knot.patch) {
@@ -121,12 +137,15 @@ fn causes(plan: &Plan) -> impl Fn(usize) -> usize {
     }
     move |i| {
         let sample = &plan.surface[i];
+        if let Some(cause) = told[i] {
+            return cause;
+        }
         if !sample.reachable {
-            return 0;
+            return others;
         }
         let at = Point3::from(sample.point);
         let away = |p: usize| (Point3::from(plan.patches[p]) - at).norm_squared();
         let nearest = (0..visited.len()).min_by(|a, b| away(*a).total_cmp(&away(*b)));
-        if nearest.is_some_and(|p| visited[p]) { 2 } else { 1 }
+        others + if nearest.is_some_and(|p| visited[p]) { 2 } else { 1 }
     }
 }

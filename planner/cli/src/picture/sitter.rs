@@ -1,7 +1,6 @@
 //! What a page is made of.
 
 use nullsweep_collision::Options;
-use nullsweep_planner::pipeline::LeftOut;
 use nullsweep_planner::plan::Plan;
 use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
@@ -22,8 +21,6 @@ pub(crate) struct Sitter<'a> {
     pub(crate) scene: Option<&'a Scene>,
     /// What the last plan's check found, if it was checked.
     pub(crate) verification: Option<&'a Verification>,
-    /// What the last plan leaves, by cause, where its making told it.
-    pub(crate) left_out: &'a [LeftOut],
     /// What was measured while they ran.
     pub(crate) flights: &'a [Flight],
     pub(crate) tables: Vec<Table>,

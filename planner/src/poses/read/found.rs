@@ -63,6 +63,15 @@ pub enum PosesError {
         /// What is wrong.
         what: String,
     },
+    /// It is a plan.
+    #[error(
+        "{}: it is a plan, made of joint vectors, and no path of the tool: `planner publish` sends it, `planner view` shows it",
+        path.display()
+    )]
+    Plan {
+        /// Which file.
+        path: PathBuf,
+    },
     /// No pose at all.
     #[error("{}: no pose in it", path.display())]
     Empty {

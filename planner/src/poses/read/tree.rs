@@ -31,6 +31,11 @@ pub(super) fn read(
         Syntax::Json => vec![serde_json::from_str(text).map_err(|e| wrong(e.to_string()))?],
         Syntax::Yaml => serde_saphyr::from_multiple(text).map_err(|e| wrong(e.to_string()))?,
     };
+    let is_plan =
+        |node: &Value| ["format", "fingerprint", "knots"].iter().all(|k| node.get(k).is_some());
+    if documents.iter().any(is_plan) {
+        return Err(PosesError::Plan { path: path.into() });
+    }
     let mut reader = Reader { order, ..Reader::default() };
     let mut loose = Vec::new();
     for document in &documents {

@@ -84,6 +84,36 @@ pub fn level(raw: &RawScan, up: Option<UnitVector3<f64>>, seed: u64) -> Result<L
     Ok(Level { up, height, area: flat.area, camera })
 }
 
+/// A flat piece that is not level by a direction, and how far it is from that.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lean {
+    /// Of the piece from level. \[rad\]
+    pub angle: f64,
+    /// How much was seen of it. \[m²\]
+    pub area: f64,
+    /// The direction by which it would be level, in the file's frame: on the sensor's side where that
+    /// is known.
+    pub up: UnitVector3<f64>,
+}
+
+/// Of the flat pieces of a scan that are large enough to tell, the one nearest to level by `up`, where none
+/// is level to within 11°.
+#[must_use]
+pub fn lean(raw: &RawScan, up: &UnitVector3<f64>, seed: u64) -> Option<Lean> {
+    let noise = Noise { sensors: raw.sensor.into_iter().collect() };
+    let (thin, side) = flat::thin(&raw.points);
+    let flats = flat::find(&thin, side, &noise, seed);
+    let large = || flats.iter().filter(|flat| flat.area >= AREA);
+    let level = |flat: &Flat| flat.normal.dot(up).abs();
+    let flat = large().max_by(|a, b| level(a).total_cmp(&level(b)))?;
+    if level(flat) > GIVEN.cos() {
+        return None;
+    }
+    let above = raw.sensor.map_or(up.into_inner(), |sensor| sensor - flat.centroid);
+    let up_by_it = if flat.normal.dot(&above) < 0.0 { -flat.normal } else { flat.normal };
+    Some(Lean { angle: level(flat).min(1.0).acos(), area: flat.area, up: up_by_it })
+}
+
 /// The direction up of a camera that is held level, if all points lie in the field of view of one at
 /// the origin.
 fn field_of_view(points: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
