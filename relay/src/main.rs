@@ -20,15 +20,11 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use tracing_subscriber::EnvFilter;
 
 use args::{Action, Cli};
-
-/// Time between two looks at the services.
-const ROUND: Duration = Duration::from_millis(1);
 
 /// What is logged, unless RUST_LOG says otherwise. zenoh's routing warns that nobody is looked for, which is
 /// meant.

@@ -14,6 +14,7 @@ use zenoh::qos::Priority;
 
 use crate::args::PlannerArgs;
 use crate::clock::Clock;
+use crate::keys;
 use crate::link::Link;
 use crate::net::{Manner, Net};
 use crate::schema::Schema;
@@ -22,8 +23,9 @@ use crate::wire::{
     self, After, Answer, Entry, Order, Parcel, Pulse, Reading, Receipt, Snapshot, sealed,
 };
 use crate::world::World;
-use crate::{ROUND, keys};
 
+/// Time between two looks at the services.
+const ROUND: Duration = Duration::from_millis(1);
 /// Time between two readings of the robot's clock, and between two attempts to greet it.
 const AGAIN: Duration = Duration::from_secs(1);
 /// How long what the executor told last is still told after it has gone.

@@ -18,14 +18,16 @@ use zenoh::qos::Priority;
 use zenoh::query::{Query, Queryable};
 
 use crate::args::RobotArgs;
+use crate::keys;
 use crate::ledger::Ledger;
 use crate::net::Net;
 use crate::schema::Schema;
 use crate::wire::{
     self, After, Answer, Entry, Order, Parcel, Pulse, Reading, Receipt, Snapshot, Taken, sealed,
 };
-use crate::{ROUND, keys};
 
+/// Time between two looks at the services.
+const ROUND: Duration = Duration::from_millis(1);
 /// Time between two signs of life.
 const PULSE: Duration = Duration::from_millis(100);
 /// Silence after which the executor is looked for: it sends telemetry 100 times a second.

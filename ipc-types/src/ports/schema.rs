@@ -6,9 +6,7 @@ use std::string::{String, ToString};
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 
 use crate::service::{COMMAND, PLAN, PLAN_EVENT, SETPOINT, STATE, TELEMETRY};
-use crate::{
-    Command, JointStates, Knot, PlanEvent, PlanHeader, Response, Setpoint, Telemetry,
-};
+use crate::{Command, JointStates, Knot, PlanEvent, PlanHeader, Response, Setpoint, Telemetry};
 
 /// A payload of a service, as its type is named on the wire.
 #[derive(Clone, Debug, PartialEq, Eq)]
