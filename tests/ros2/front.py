@@ -29,6 +29,9 @@ class Front(Stage):
             self.start_executor()
             serve = self.start("serve", self.bridge, "serve", "--arm", self.side, "--publish-joint-states",
                        *held, *self.place)
+            show = self.start("show", self.bridge, "show", plan, "--arm", self.side, "--publish-tf",
+                              *held, *self.place)
+            look = self.start("look", self.python, HERE / "look.py", "--json", self.folder / "look.json")
             program = self.start("goals", self.python, HERE / "goals.py", "--count", count, "--json",
                                  figures, "--last")
             self.until("all goals", lambda: program.poll() is not None
@@ -38,6 +41,8 @@ class Front(Stage):
             serve.wait(10)
             ended = ("executing" in before, self.status())
             program.wait(30)
+            self.end(look)
+            self.end(show)
             self.end(mock)
             quiet = mock.returncode == 0
         except subprocess.TimeoutExpired:
@@ -48,10 +53,26 @@ class Front(Stage):
         if not figures.exists():
             print(self.said("goals")[-2000:], self.said("serve")[-2000:])
             return False
-        return judge(json.load(open(figures)), quiet, *ended)
+        looked = self.folder / "look.json"
+        seen = json.load(open(looked)) if looked.exists() else None
+        return judge(json.load(open(figures)), seen, quiet, *ended)
 
 
-def judge(found, quiet, moved, status):
+def shown(seen):
+    """Whether RViz has something to show."""
+    if seen is None:
+        return [("frames and markers are shown", False, "nothing was seen")]
+    rate = seen["messages"] / seen["seconds"]
+    return [
+        ("the arm's frames come, from the root", rate > 10 and seen["unit"] and len(seen["frames"]) >= 7
+         and seen["root"] == "base_footprint", f"{len(seen['frames'])} frames, {rate:.0f} a second"),
+        ("a plan's way is shown, on the surface and off it", seen["points"] > 50 and seen["colours"] == 2,
+         f"{seen['points']} points"),
+        ("the tool's place moves with the arm", seen["moved"] > 0.5, f"{seen['moved']:.2f} m"),
+    ]
+
+
+def judge(found, seen, quiet, moved, status):
     goals = found["goals"]
     taken = [g for g in goals if g["accepted"]]
     ends = collections.Counter((g["kind"], *g["ends"]) for g in taken)
@@ -80,5 +101,6 @@ def judge(found, quiet, moved, status):
         ("a result asked for again is the same", found["same"], ""),
         ("a trajectory on the topic moves the arm", found["topic"], ""),
         ("feedback came", found["feedback"] > len(taken), f"{found['feedback']} messages"),
+        *shown(seen),
         ("the endpoint saw no violation", quiet, "by the mock's judge"),
     ])
