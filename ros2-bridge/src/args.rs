@@ -163,6 +163,29 @@ pub struct ShowArgs {
     pub publish_joint_states: bool,
 }
 
+/// Which cloud, and where to.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ScanArgs {
+    /// Topic of the clouds (sensor_msgs/PointCloud2)
+    #[arg(long, default_value = "/points")]
+    pub topic: String,
+    /// The file that is written
+    #[arg(long, value_name = "FILE.pcd", default_value = "scan.pcd")]
+    pub out: PathBuf,
+    /// The frame, with z up, in which the sensor's pose is looked up by TF and written as the file's
+    /// viewpoint; without it the file has none
+    #[arg(long)]
+    pub frame: Option<String>,
+    /// Seconds to wait for a cloud and its pose
+    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds)]
+    pub timeout: std::time::Duration,
+}
+
+fn seconds(text: &str) -> Result<std::time::Duration, String> {
+    let parsed = text.parse::<f64>().ok().filter(|s| (0.1..=3600.0).contains(s));
+    parsed.map(std::time::Duration::from_secs_f64).ok_or_else(|| "seconds, 0.1 to 3600".into())
+}
+
 impl ShowArgs {
     /// The arm, with the others where they are held.
     pub fn load(&self) -> anyhow::Result<Arm> {

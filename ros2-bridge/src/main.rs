@@ -14,6 +14,7 @@ mod link;
 mod manager;
 mod messages;
 mod pictures;
+mod scan;
 mod serve;
 mod show;
 mod threads;
@@ -28,7 +29,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use nullsweep_executor::log::{Log, last_words};
 
-use args::{Common, RunArgs, ServeArgs, ShowArgs};
+use args::{Common, RunArgs, ScanArgs, ServeArgs, ShowArgs};
 
 /// Stands between the executor and an arm that speaks ROS 2.
 #[derive(Debug, Parser)]
@@ -52,6 +53,8 @@ enum Command {
     Serve(Box<ServeArgs>),
     /// Show the arm and a plan to RViz and Foxglove, until ended
     Show(Box<ShowArgs>),
+    /// Write one cloud of a topic as a scan for the planner
+    Scan(Box<ScanArgs>),
 }
 
 fn main() -> ExitCode {
@@ -71,6 +74,7 @@ fn main() -> ExitCode {
         Command::Run(args) => endpoint::run(&cli.common, args),
         Command::Serve(args) => serve::run(&cli.common, args),
         Command::Show(args) => show::run(&cli.common, args),
+        Command::Scan(args) => scan::run(&cli.common, args),
     };
     log.end();
     match result {

@@ -235,6 +235,7 @@ class Goals:
     def __init__(self, node, arm, name):
         self.node, self.arm, self.lock = node, arm, threading.Lock()
         self.current, self.end, self.next = None, 0.0, None
+        self.told = 0.0
         self.ends = {}
         self.server = ActionServer(
             node, FollowJointTrajectory, name + "/follow_joint_trajectory", execute_callback=self.execute,
@@ -280,6 +281,9 @@ class Goals:
                 self.current = None
                 how = ("succeed", 0)
             else:
+                if now < self.told + 0.1:
+                    return
+                self.told = now
                 feedback = FollowJointTrajectory.Feedback(joint_names=self.arm.names)
                 feedback.desired.positions, feedback.actual.positions = self.arm.last[0], self.arm.measured
                 feedback.error.positions = [a - b for a, b in zip(self.arm.last[0], self.arm.measured)]
