@@ -172,8 +172,8 @@ pub struct ScanArgs {
     /// The file that is written
     #[arg(long, value_name = "FILE.pcd", default_value = "scan.pcd")]
     pub out: PathBuf,
-    /// The frame, with z up, in which the sensor's pose is looked up by TF and written as the file's
-    /// viewpoint; without it the file has none
+    /// The frame, with z up, in which the sensor's pose is looked up by TF: told as the planner's
+    /// --sensor-pose, and written as the file's viewpoint
     #[arg(long)]
     pub frame: Option<String>,
     /// Seconds to wait for a cloud and its pose

@@ -141,12 +141,12 @@ fn words(manager: &str, controller: &str, all: &[Loaded]) -> String {
     let others = if others.is_empty() { "none".to_string() } else { others.join(", ") };
     match all.iter().find(|c| c.name == controller) {
         Some(c) if c.state == "inactive" => format!(
-            "{manager} says that {controller} is inactive: `ros2 control switch_controllers --activate \\
+            "{manager} says that {controller} is inactive: `ros2 control switch_controllers --activate \
              {controller}`"
         ),
         Some(c) => format!("{manager} says that {controller} is {}", c.state),
         None => format!(
-            "{manager} has no {controller}; loaded are: {others}. `ros2 control load_controller \\
+            "{manager} has no {controller}; loaded are: {others}. `ros2 control load_controller \
              {controller}`, or --controller for another one"
         ),
     }

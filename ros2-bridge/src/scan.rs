@@ -80,11 +80,11 @@ pub fn run(common: &Common, args: &ScanArgs) -> anyhow::Result<()> {
         let write = |mut file: std::fs::File| file.write_all(&pcd(&points, &pose));
         file.and_then(write).with_context(|| format!("cannot write {}", args.out.display()))?;
         let (seen, all) = (points.len(), cloud.width as usize * cloud.height as usize);
-        println!(
-            "{}: {seen} points of {all}, measured in {}",
-            args.out.display(),
-            cloud.header.frame_id
-        );
+        println!("{}: {seen} points of {all}", args.out.display());
+        if let Some(frame) = &args.frame {
+            println!("as measured in {}, which is in {frame} at", cloud.header.frame_id);
+            println!("--sensor-pose {}", flag(&pose));
+        }
         return Ok(());
     }
     let seconds = args.timeout.as_secs_f64();
@@ -186,6 +186,13 @@ fn points(cloud: &Cloud) -> anyhow::Result<Vec<[f32; 3]>> {
     Ok(all.filter(|point| point.iter().all(|v| v.is_finite())).collect())
 }
 
+/// A pose as the planner's `--sensor-pose` takes it.
+fn flag(pose: &Isometry3<f64>) -> String {
+    let (place, turn) = (pose.translation, pose.rotation);
+    let all = [place.x, place.y, place.z, turn.i, turn.j, turn.k, turn.w];
+    all.map(|value| value.to_string()).join(",")
+}
+
 /// A binary PCD file, its viewpoint the sensor's pose.
 fn pcd(points: &[[f32; 3]], pose: &Isometry3<f64>) -> Vec<u8> {
     let (place, turn) = (pose.translation, pose.rotation);
@@ -278,5 +285,6 @@ mod tests {
         let head = String::from_utf8_lossy(&text[..text.len() - 12]).into_owned();
         assert!(head.contains("VIEWPOINT 0.5 0 1 1 0 0 0\nPOINTS 1\n"), "{head}");
         assert_eq!(text[text.len() - 4..], 3.0_f32.to_le_bytes());
+        assert_eq!(flag(&Isometry3::translation(0.5, 0.0, 1.0)), "0.5,0,1,0,0,0,1");
     }
 }

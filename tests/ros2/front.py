@@ -83,7 +83,8 @@ class Front(Stage):
             ("the endpoint saw no violation", mock.returncode == 0, "by the mock's judge"),
             ("a cloud became a scan, without what is no number", made and len(body) == 12 * 3599
              and abs(point[2] - 0.7) < 1e-6, wrote.strip()),
-            ("it has the sensor's pose by TF", b"VIEWPOINT 0.3 0 1.2 0 1 0 0\n" in head, ""),
+            ("it has the sensor's pose by TF", b"VIEWPOINT 0.3 0 1.2 0 1 0 0\n" in head
+             and "--sensor-pose 0.3,0,1.2,1,0,0,0" in wrote, ""),
             ("a frame that is not there is told", not told and "camera_optical in map" in lost,
              lost.strip()[-120:]),
         ])
