@@ -129,7 +129,7 @@ def judge(found, quiet, moved, status):
          f"{len(short)} of {len(goals)} goals"),
         ("all cancelled: neither what runs nor what waits goes on", found["swept"], ""),
         ("what is to begin later waits", found["later"], ""),
-        ("SIGTERM to the bridge stops the arm", moved and ": hold" in status, status),
+        ("SIGTERM to the bridge stops the arm", moved and "holding, no plan runs" in status, status),
         ("a result asked for again is the same", found["same"], ""),
         ("a trajectory on the topic moves the arm", found["topic"], ""),
         ("feedback came", found["feedback"] > len(taken), f"{found['feedback']} messages"),
