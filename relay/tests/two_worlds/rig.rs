@@ -4,8 +4,8 @@ use std::fs::File;
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -47,6 +47,9 @@ impl Drop for Process {
     }
 }
 
+/// One robot at a time: its executor runs before all else on the machine.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// What the endpoint saw.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
@@ -63,6 +66,7 @@ pub(crate) struct RobotHost {
     pub(crate) executor: Process,
     over: Arc<AtomicBool>,
     endpoint: Option<JoinHandle<Seen>>,
+    _alone: MutexGuard<'static, ()>,
 }
 
 fn arm() -> Arm {
@@ -71,6 +75,7 @@ fn arm() -> Arm {
 
 impl RobotHost {
     pub(crate) fn start() -> Self {
+        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let root = TempDir::new().unwrap();
         let ipc = Ipc::open("pr2", Some(root.path())).unwrap();
         let arguments = format!("executor run --ipc-root {} {PATIENT}", root.path().display());
@@ -86,7 +91,7 @@ impl RobotHost {
         let endpoint =
             thread::spawn(move || endpoint(&Ipc::open("pr2", Some(&path)).unwrap(), &arm(), &done));
         let (executor, endpoint) = (Process(executor), Some(endpoint));
-        Self { root, ipc, arm: arm(), executor, over, endpoint }
+        Self { root, ipc, arm: arm(), executor, over, endpoint, _alone: alone }
     }
 
     /// Moves joint 0 by `angle` in `seconds` from where it is at `from`.
@@ -236,7 +241,7 @@ fn show_where_it_failed(folder: &Path, end: &str) {
 
 /// Waits until it is so.
 pub(crate) fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
-    let end = Instant::now() + Duration::from_secs(30);
+    let end = Instant::now() + Duration::from_secs(60);
     while !is_so() {
         assert!(Instant::now() < end, "no {what}");
         thread::sleep(Duration::from_millis(5));
