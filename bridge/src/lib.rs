@@ -15,7 +15,9 @@ mod endpoint;
 mod front;
 mod player;
 mod playout;
+mod splice;
 mod stream;
+mod thin;
 mod wall;
 mod whole;
 
@@ -25,5 +27,6 @@ pub use front::{Front, FrontError, Waypoint, front};
 pub use player::Player;
 pub use playout::Playout;
 pub use stream::{Message, Point, Rules, Stop, Stream, Takeover};
+pub use thin::thin;
 pub use wall::{moment, wall_time};
 pub use whole::{Ask, Goal, Whole, fit};

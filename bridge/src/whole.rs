@@ -1,5 +1,6 @@
 //! Whole plans: each admitted by the executor's own rules and given to the controller as one goal. A
-//! plan that joins another one in a knot takes its place there; the controller splices it.
+//! plan that joins another one in a knot takes its place there; the controller splices it, or, where that
+//! leaves a goal for the next one at once, the goal begins with what is ahead of the old one.
 
 use nullsweep_executor::{
     Guard, Held, Ids, Join, Rejection, Rules, ValidPlan, admit, joins_at, starts_at,
@@ -11,12 +12,15 @@ use nullsweep_ipc_types::{
 };
 use nullsweep_robot::{Arm, JointKind, JointVector};
 
-use crate::stream::Point;
+use crate::stream::{Point, Takeover};
 
 /// A goal starts so long after it is sent. \[ns\]
 const AHEAD_NS: u64 = 200_000_000;
-/// From where the arm is to the first knot, at most the guard's start tolerance away. \[ns\]
-const CONNECT_NS: u64 = 500_000_000;
+/// From where the arm is to the first knot, at most the guard's start tolerance away; meanwhile a goal that
+/// was lost may be sent again. \[ns\]
+const CONNECT_NS: u64 = 1_500_000_000;
+/// A goal must come so long before its first motion. \[ns\]
+const EARLY_NS: u64 = 50_000_000;
 /// Time between two telemetry samples. \[ns\]
 const TELL_NS: u64 = 10_000_000;
 
@@ -27,6 +31,8 @@ pub struct Goal {
     pub id: String,
     /// When its points' time 0 is. \[ns, `CLOCK_MONOTONIC`\]
     pub start_ns: u64,
+    /// When it is too late for it: the arm would have to go on in the midst of it. \[ns\]
+    pub until_ns: u64,
     /// At least one.
     pub points: Vec<Point>,
     /// Whether the points' velocities count; else the controller goes straight.
@@ -45,7 +51,7 @@ pub enum Ask {
 /// A goal that the controller has.
 struct Running {
     plan: ValidPlan,
-    goal: String,
+    goal: Goal,
     /// When its time 0 is. \[ns\]
     start_ns: u64,
     started: bool,
@@ -87,6 +93,7 @@ pub struct Whole {
     events: Sender<PlanEvent>,
     telemetry: Sender<Telemetry>,
     rules: Rules,
+    takeover: Takeover,
     ids: Ids,
     state: Option<JointStates>,
     running: Option<Running>,
@@ -98,11 +105,12 @@ pub struct Whole {
 }
 
 impl Whole {
-    /// Takes the executor's place at the plan service.
+    /// Takes the executor's place at the plan service. `takeover`: when the controller leaves a goal for
+    /// the next one.
     ///
     /// # Errors
     /// An executor runs already, or the services cannot be opened.
-    pub fn open(ipc: &Ipc, arm: &Arm) -> Result<Self, IpcError> {
+    pub fn open(ipc: &Ipc, arm: &Arm, takeover: Takeover) -> Result<Self, IpcError> {
         let robot = arm.robot();
         let turns = |name: &str| {
             robot.joints().iter().any(|j| j.name == name && j.kind == JointKind::Continuous)
@@ -119,6 +127,7 @@ impl Whole {
             events: ipc.event_sender()?,
             telemetry: ipc.telemetry_sender()?,
             rules,
+            takeover,
             ids: Ids::default(),
             state: None,
             running: None,
@@ -207,12 +216,12 @@ impl Whole {
     /// [`PortError`] where it cannot be told.
     pub fn ended(&mut self, goal: &str, failed: Option<&str>) -> Result<(), PortError> {
         let Some(why) = failed else {
-            if let Some(running) = self.running.as_mut().filter(|r| r.goal == goal) {
+            if let Some(running) = self.running.as_mut().filter(|r| r.goal.id == goal) {
                 running.ended_ns = Some(now_ns());
             }
             return Ok(());
         };
-        let Some(running) = self.running.take_if(|r| r.goal == goal) else { return Ok(()) };
+        let Some(running) = self.running.take_if(|r| r.goal.id == goal) else { return Ok(()) };
         let id = running.plan.id();
         tracing::error!("plan {id} ended by the controller: {why}");
         self.tell(id, EventKind::Aborted, Rejection::new(Reason::Fault))
@@ -235,6 +244,14 @@ impl Whole {
         let guard = &self.rules.guard;
         let measured = self.joints(&state);
         let running = self.running.as_ref().map(|r| (&r.plan, r.start_ns));
+        // A goal that holds some of both is curved or is not.
+        let curved = plan.interpolation() == Interpolation::Cubic;
+        if let (Some(r), Join::Knot { .. }, Takeover::AtArrival) =
+            (&self.running, plan.join(), self.takeover)
+            && r.goal.curved != curved
+        {
+            return Err(Rejection::new(Reason::JoinPlan));
+        }
         fit(plan, running, &measured, guard, now_ns())
     }
 
@@ -248,9 +265,10 @@ impl Whole {
         let id = plan.id();
         let joins = matches!(plan.join(), Join::Knot { .. });
         let lead = if joins { 0 } else { CONNECT_NS };
-        let goal = Goal {
+        let mut goal = Goal {
             id: format!("nullsweep-{id}"),
             start_ns: start_ns - lead,
+            until_ns: start_ns - EARLY_NS,
             // A joining plan's first knot is where the splice is.
             points: plan
                 .knots()
@@ -260,10 +278,13 @@ impl Whole {
                 .collect(),
             curved: plan.interpolation() == Interpolation::Cubic,
         };
+        if let (Some(old), true, Takeover::AtArrival) = (&self.running, joins, self.takeover) {
+            goal = goal.behind(&old.goal, now_ns());
+        }
         let waited = now_ns().saturating_sub(id.epoch) as f64 * 1e-9;
         let told = Rejection::new(Reason::None).value(waited, plan.duration() * 1e-9);
         let running = Running {
-            goal: goal.id.clone(),
+            goal: goal.clone(),
             plan,
             start_ns,
             started: false,

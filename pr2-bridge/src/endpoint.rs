@@ -93,7 +93,7 @@ fn whole_plans(
     mut ear: Ear,
     done: &AtomicBool,
 ) -> anyhow::Result<()> {
-    let mut whole = Whole::open(ipc, arm)?;
+    let mut whole = Whole::open(ipc, arm, Takeover::AtStamp)?;
     let mut told = Told::default();
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(Duration::from_millis(2));

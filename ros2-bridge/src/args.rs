@@ -79,6 +79,10 @@ pub struct RunArgs {
     /// Do without the controller's topic controller_state, which tells whether it is active
     #[arg(long)]
     pub no_controller_state: bool,
+    /// The controller_manager that is asked which controllers there are, when none listens or the one
+    /// that is meant is not active
+    #[arg(long, value_name = "NAME", default_value = "/controller_manager")]
+    pub controller_manager: String,
     /// Topic of the arm's joint states
     #[arg(long, default_value = "/joint_states")]
     pub joint_states: String,
@@ -103,6 +107,10 @@ pub struct RunArgs {
     /// SCHED_FIFO priority, where permitted; 0 for the default scheduler
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u8).range(0..=99))]
     pub priority: u8,
+    /// Take whole plans instead of setpoints, each as one goal of the controller's action: no executor
+    /// runs then
+    #[arg(long, conflicts_with = "interface")]
+    pub whole_plan: bool,
 }
 
 /// How goals are served.
@@ -127,12 +135,75 @@ pub struct ServeArgs {
     pub publish_joint_states: bool,
 }
 
+/// What is shown.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ShowArgs {
+    /// The robot's name in the service names
+    #[arg(long, default_value = DEFAULT_ROBOT)]
+    pub robot_name: String,
+    /// iceoryx2's root path, if not the default
+    #[arg(long)]
+    pub ipc_root: Option<PathBuf>,
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Where a joint outside the arm stands, as JOINT=POSITION in rad or m; may be repeated
+    #[arg(long, value_name = "JOINT=POSITION", value_parser = held)]
+    pub held: Vec<(String, f64)>,
+    /// A plan file, whose way is shown
+    #[arg(value_name = "PLAN")]
+    pub plan: Option<PathBuf>,
+    /// Topic of the markers
+    #[arg(long, default_value = "/nullsweep/markers")]
+    pub topic: String,
+    /// Tell the arm's frames on /tf, for robots without a robot_state_publisher
+    #[arg(long)]
+    pub publish_tf: bool,
+    /// Tell where the arm is measured on /joint_states, for robots whose driver does not
+    #[arg(long)]
+    pub publish_joint_states: bool,
+}
+
+/// Which cloud, and where to.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ScanArgs {
+    /// Topic of the clouds (sensor_msgs/PointCloud2)
+    #[arg(long, default_value = "/points")]
+    pub topic: String,
+    /// The file that is written
+    #[arg(long, value_name = "FILE.pcd", default_value = "scan.pcd")]
+    pub out: PathBuf,
+    /// The frame, with z up, in which the sensor's pose is looked up by TF: told as the planner's
+    /// --sensor-pose, and written as the file's viewpoint
+    #[arg(long)]
+    pub frame: Option<String>,
+    /// Seconds to wait for a cloud and its pose
+    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds)]
+    pub timeout: std::time::Duration,
+}
+
+fn seconds(text: &str) -> Result<std::time::Duration, String> {
+    let parsed = text.parse::<f64>().ok().filter(|s| (0.1..=3600.0).contains(s));
+    parsed.map(std::time::Duration::from_secs_f64).ok_or_else(|| "seconds, 0.1 to 3600".into())
+}
+
+impl ShowArgs {
+    /// The arm, with the others where they are held.
+    pub fn load(&self) -> anyhow::Result<Arm> {
+        at_hold(&self.arm, &self.held)
+    }
+}
+
+/// The arm, with the others where they are held.
+fn at_hold(arm: &ArmArgs, held: &[(String, f64)]) -> anyhow::Result<Arm> {
+    let held: Vec<(&str, f64)> =
+        held.iter().map(|(name, position)| (name.as_str(), *position)).collect();
+    Ok(arm.load()?.with_held(&held)?)
+}
+
 impl ServeArgs {
     /// The arm, with the others where they are held.
     pub fn load(&self) -> anyhow::Result<Arm> {
-        let held: Vec<(&str, f64)> =
-            self.held.iter().map(|(name, position)| (name.as_str(), *position)).collect();
-        Ok(self.arm.load()?.with_held(&held)?)
+        at_hold(&self.arm, &self.held)
     }
 }
 

@@ -5,17 +5,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::Context;
-use nullsweep_bridge::{Do, Ear, Endpoint, Health, Heard, Player, moment};
+use nullsweep_bridge::{Do, Ear, Endpoint, Player};
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
-use nullsweep_ipc_types::status;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::args::{Common, Interface, RunArgs};
-use crate::link::{Known, Link};
-use crate::messages::JointState;
+use crate::link::Link;
 use crate::ticks::Ticks;
+use crate::told::{DEAF, Told, health, heard};
 use crate::trajectory::{positions, trajectory};
+use crate::whole;
 
 /// Time between two looks. The executor's setpoints wait in their buffer meanwhile.
 const ROUND: Duration = Duration::from_micros(500);
@@ -42,6 +42,9 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
         common.domain,
         names.join(" ")
     );
+    if args.whole_plan {
+        return whole::run((common, args), &ipc, &arm, link, ear, &done);
+    }
     let mut endpoint = Endpoint::open(&ipc, &arm, ear, &args.timing(), args.takeover())
         .context("an endpoint runs already")?;
     let mut player = Player::new(args.period() * 1_000_000);
@@ -50,15 +53,13 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     while !done.load(Ordering::Relaxed) {
         std::thread::sleep(ROUND);
         if link.is_deaf() {
-            tracing::error!(
-                "the DDS library's threads have ended, as they do in a process that was stopped and \
-                 goes on: the domain is joined anew, no state is passed on until then"
-            );
+            tracing::error!("{DEAF}");
             link.again(common, args).context("the domain cannot be joined anew")?;
         }
         let states = link.hear();
         let known = link.known();
         told.tell(known, endpoint.hears(now_ns()), args);
+        told.manager(link.said());
         let health = health(known);
         for (state, at_ns) in &states {
             endpoint.hear(&heard(state, *at_ns), health)?;
@@ -83,62 +84,4 @@ pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     }
     tracing::info!("ended: {}, {} messages not sent", endpoint.sum(), link.lost);
     Ok(())
-}
-
-/// What the executor is told of the robot.
-fn health(known: Known) -> Health {
-    // ROS 2 has no word for it: an arm whose driver speaks is one that knows where it is.
-    let mut status = status::CALIBRATED;
-    if known.running != Some(true) {
-        status |= status::HALTED;
-    }
-    Health { status, is_linked: known.listens && known.active != Some(false) }
-}
-
-/// A message of joint states.
-fn heard(message: &JointState, at_ns: u64) -> Heard<'_> {
-    let stamp = message.header.stamp;
-    Heard {
-        stamp_ns: moment(stamp.sec, stamp.nanosec),
-        at_ns,
-        names: &message.name,
-        positions: &message.position,
-        velocities: &message.velocity,
-        efforts: &message.effort,
-    }
-}
-
-/// Says what changed.
-#[derive(Default)]
-struct Told(Option<(Known, bool)>);
-
-impl Told {
-    fn tell(&mut self, known: Known, hears: bool, args: &RunArgs) {
-        if self.0.replace((known, hears)) == Some((known, hears)) {
-            return;
-        }
-        let (controller, states) = (&args.controller, &args.joint_states);
-        if !known.listens {
-            tracing::error!(
-                "no controller listens: nobody takes what is sent to {controller}; no state is \
-                 passed on, the arm stops. Is it loaded, in this domain (ROS_DOMAIN_ID), on this \
-                 network?"
-            );
-        } else if known.active == Some(false) {
-            tracing::error!(
-                "the controller {controller} is not active: its controller_state is silent; no state \
-                 is passed on. `ros2 control switch_controllers --activate` it"
-            );
-        } else if !known.speaks {
-            tracing::error!("{states} has no sender: no state is passed on, the arm stops");
-        } else if !hears {
-            tracing::error!("{states} is silent: no state is passed on, the arm stops");
-        } else if known.running != Some(true) {
-            let topic = args.running.as_deref().unwrap_or_default();
-            let why = if known.running.is_none() { "has not said a word" } else { "says so" };
-            tracing::warn!("the motors are off: {topic} {why}");
-        } else {
-            tracing::info!("joint states come, motors on, controller listening");
-        }
-    }
 }

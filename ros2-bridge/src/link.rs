@@ -3,6 +3,7 @@
 
 use std::time::{Duration, Instant};
 
+use nullsweep_bridge::Goal;
 use nullsweep_ipc_types::ports::now_ns;
 use ros2_client::qos::Durability;
 use ros2_client::service::Client;
@@ -10,6 +11,8 @@ use ros2_client::{Name, Node, Publisher, ServiceMapping, ServiceTypeName, Subscr
 
 use crate::args::{Common, Interface, RunArgs};
 use crate::domain::{absolute, join, newest, reliable, spin, topic};
+use crate::follower::{Ended, Follower};
+use crate::manager::Manager;
 use crate::messages::{
     Bool, ControllerState, Float64MultiArray, JointState, JointTrajectory, SetBoolRequest,
     SetBoolResponse,
@@ -25,6 +28,7 @@ const ACTIVE_NS: u64 = 500_000_000;
 enum Command {
     Trajectory(Publisher<JointTrajectory>),
     Positions(Publisher<Float64MultiArray>),
+    Goals(Box<Follower>),
 }
 
 /// What is known of the robot.
@@ -49,6 +53,7 @@ pub struct Link {
     running: Option<Subscription<Bool>>,
     state: Option<Subscription<ControllerState>>,
     power: Option<Client<SetBoolRequest, SetBoolResponse>>,
+    manager: Manager,
     /// What the motors were last asked to be.
     wanted: Option<bool>,
     known: Known,
@@ -86,6 +91,9 @@ impl Link {
         let mut node = join(common, "nullsweep_bridge")?;
         let controller = absolute(&args.controller);
         let command = match args.interface {
+            Interface::Trajectory if args.whole_plan => {
+                Command::Goals(Box::new(Follower::open(&mut node, &controller)?))
+            }
             Interface::Trajectory => {
                 let kind = ("trajectory_msgs", "JointTrajectory");
                 let topic = topic(&node, &format!("{controller}/joint_trajectory"), kind)?;
@@ -125,6 +133,7 @@ impl Link {
             )?),
             None => None,
         };
+        let manager = Manager::open(&mut node, &args.controller_manager, &controller)?;
         spin(&mut node)?;
         let known = Known {
             listens: false,
@@ -140,6 +149,7 @@ impl Link {
             running,
             state,
             power,
+            manager,
             wanted: None,
             known,
             looked,
@@ -182,14 +192,25 @@ impl Link {
         }
         if self.looked.elapsed() >= LOOK {
             self.looked = Instant::now();
-            let count = match &self.command {
-                Command::Trajectory(topic) => topic.get_subscription_count(&self.node),
-                Command::Positions(topic) => topic.get_subscription_count(&self.node),
+            self.known.listens = match &self.command {
+                Command::Trajectory(topic) => topic.get_subscription_count(&self.node) > 0,
+                Command::Positions(topic) => topic.get_subscription_count(&self.node) > 0,
+                Command::Goals(follower) => follower.is_there(&self.node),
             };
-            self.known.listens = count > 0;
             self.known.speaks = self.joints.get_publisher_count(&self.node) > 0;
+            if self.known.listens && self.known.active != Some(false) {
+                self.manager.forget();
+            } else {
+                self.manager.ask();
+            }
         }
         states
+    }
+
+    /// What the controller_manager says, while no controller listens or the one that is meant is not
+    /// active; `None` where it has not answered.
+    pub fn said(&self) -> Option<String> {
+        self.manager.said()
     }
 
     /// What is known of the robot.
@@ -201,6 +222,36 @@ impl Link {
     pub fn follow(&mut self, trajectory: JointTrajectory) {
         if let Command::Trajectory(topic) = &self.command {
             self.lost += u64::from(topic.publish(trajectory).is_err());
+        }
+    }
+
+    /// Sends a whole plan.
+    pub fn send(&mut self, goal: &Goal, names: &[String]) {
+        if let Command::Goals(follower) = &mut self.command {
+            follower.send(goal, names);
+        }
+    }
+
+    /// Has the controller hold, where it has whole plans.
+    pub fn hold(&self) {
+        if let Command::Goals(follower) = &self.command {
+            follower.cancel();
+        }
+    }
+
+    /// The ends of whole plans that came.
+    pub fn ends(&mut self) -> Vec<Ended> {
+        match &mut self.command {
+            Command::Goals(follower) => follower.hear(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// How far the controller said that the arm was from a whole plan's path, at most. \[rad\]
+    pub fn farthest(&self) -> f64 {
+        match &self.command {
+            Command::Goals(follower) => follower.farthest(),
+            _ => 0.0,
         }
     }
 

@@ -8,13 +8,20 @@ mod brake;
 mod domain;
 mod door;
 mod endpoint;
+mod follower;
 mod goals;
 mod link;
+mod manager;
 mod messages;
+mod pictures;
+mod scan;
 mod serve;
+mod show;
 mod threads;
 mod ticks;
+mod told;
 mod trajectory;
+mod whole;
 mod wish;
 
 use std::process::ExitCode;
@@ -22,7 +29,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use nullsweep_executor::log::{Log, last_words};
 
-use args::{Common, RunArgs, ServeArgs};
+use args::{Common, RunArgs, ScanArgs, ServeArgs, ShowArgs};
 
 /// Stands between the executor and an arm that speaks ROS 2.
 #[derive(Debug, Parser)]
@@ -44,13 +51,17 @@ enum Command {
     Run(Box<RunArgs>),
     /// Be a controller for ROS programs, with the executor behind it, until ended
     Serve(Box<ServeArgs>),
+    /// Show the arm and a plan to RViz and Foxglove, until ended
+    Show(Box<ShowArgs>),
+    /// Write one cloud of a topic as a scan for the planner
+    Scan(Box<ScanArgs>),
 }
 
 fn main() -> ExitCode {
     // The priority in a cell is the executor's.
     let cli: Cli = match nullsweep_cell::parse(
         std::env::args_os(),
-        &[("run", &["priority"]), ("serve", &["priority"])],
+        &[("run", &["priority"]), ("serve", &["priority"]), ("show", &["priority"])],
         &[],
     ) {
         Ok(cli) => cli,
@@ -62,6 +73,8 @@ fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Run(args) => endpoint::run(&cli.common, args),
         Command::Serve(args) => serve::run(&cli.common, args),
+        Command::Show(args) => show::run(&cli.common, args),
+        Command::Scan(args) => scan::run(&cli.common, args),
     };
     log.end();
     match result {

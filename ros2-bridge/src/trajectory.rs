@@ -1,6 +1,6 @@
 //! Messages to the arm's controller.
 
-use nullsweep_bridge::{Message, Point, wall_time};
+use nullsweep_bridge::{Goal, Message, Point, thin, wall_time};
 use nullsweep_robot::JointVector;
 
 use crate::messages::{
@@ -24,6 +24,23 @@ pub fn trajectory(message: &Message, names: &[String]) -> JointTrajectory {
         },
         joint_names: names.to_vec(),
         points: message.points.iter().map(|p| point(p, names.len())).collect(),
+    }
+}
+
+/// How far a whole plan's points may be from the motion that the controller makes of fewer. \[rad\] or \[m\]
+const WITHIN: f64 = 2e-4;
+
+/// A whole plan as a joint_trajectory_controller's action takes it; without velocities it goes straight.
+/// Long messages are lost on the way to a busy machine, so points that the others explain are left out.
+pub fn whole(goal: &Goal, names: &[String]) -> JointTrajectory {
+    let point = |p: &Point| {
+        let point = point(p, names.len());
+        if goal.curved { point } else { JointTrajectoryPoint { velocities: Vec::new(), ..point } }
+    };
+    JointTrajectory {
+        header: Header { stamp: ros_time(goal.start_ns), frame_id: goal.id.clone() },
+        joint_names: names.to_vec(),
+        points: thin(&goal.points, goal.curved, WITHIN).iter().map(point).collect(),
     }
 }
 

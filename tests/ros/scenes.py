@@ -56,7 +56,7 @@ def plans(planner, folder, args):
     first, second = folder / "first.json", folder / "second.json"
     run = lambda more: subprocess.check_call([planner] + common + more, stdout=subprocess.DEVNULL)
     run(["--out", str(first), "--json", str(folder / "first-figures.json")])
-    if args.faults or args.conformance or getattr(args, "serve", False):
+    if args.faults or args.conformance or getattr(args, "serve", False) or getattr(args, "look", False):
         return first, None, None, None
     knots = json.load(open(first))["knots"]
     due = 0.35 * knots[-1]["t"]

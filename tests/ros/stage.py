@@ -64,7 +64,7 @@ class Stage:
     def start_executor(self):
         self.executor_process = self.start("executor", self.executor, "run", "--arm", self.side,
                                            *self.place, *PATIENT)
-        self.until("hold", lambda: "hold" in self.status())
+        self.until("hold", lambda: "holding, no plan runs" in self.status())
 
     def status(self):
         return self.run(self.executor, "ctl", *self.place, "status")[0].strip()

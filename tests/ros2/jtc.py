@@ -60,7 +60,7 @@ FAULTS = {
     "the motors lose their power": (
         lambda s: s.play("halt"), "the motors are off", "fault", lambda s: s.play("run"), RESET),
     "the controller is switched off": (
-        lambda s: s.play("idle"), "is not active", "communication", lambda s: s.play("work"), RESET),
+        lambda s: s.play("idle"), "says that arm_controller is inactive", "communication", lambda s: s.play("work"), RESET),
     "the controller no longer listens": (
         lambda s: s.play("deaf"), "no controller listens", "communication", None, []),
     "the bridge stalls for 0.5 s": (

@@ -9,6 +9,9 @@ given, straight where not. With `--replace stamp` it does as `allow_trajectory_r
 old one is followed up to the stamp of the new one. A stamp of 0 means now. Refused are other joints
 than its own, points out of order, a trajectory that ends in the past or not at rest. After its last
 point it holds. `controller_state` tells what it does, 50 times a second, while it is active. The
+action `~/follow_joint_trajectory` takes trajectories as goals: one that comes while another is under way
+takes its place, and the old one ends aborted; it has succeeded once its last point is reached; cancelled,
+the arm holds. The service `/controller_manager/list_controllers` tells the controller's state. The
 service `/power` (std_srvs/SetBool) switches the motors, and `/running` (std_msgs/Bool) tells them.
 
 `--interface position` is a forward_position_controller instead: what comes on `commands` is where
@@ -36,9 +39,14 @@ import threading
 import time
 
 import rclpy
+from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTrajectoryControllerState
+from controller_manager_msgs.msg import ControllerState
+from controller_manager_msgs.srv import ListControllers
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64MultiArray
 from std_srvs.srv import SetBool
@@ -155,18 +163,39 @@ class Controller(Arm):
                 print("refused:", start, flush=True)
                 self.seen["dropped"] += 1
                 return
-            at = max(now, start) if self.at_stamp else now
             if points[0][0] < now:
                 # It has to go on in the midst of it.
                 self.seen["late"] += 1
-            q, v = self.desired(at)
-            for j, turning in enumerate(self.turns):
-                if turning:
-                    by = 2 * math.pi * round((q[j] - points[0][1][j]) / (2 * math.pi))
-                    for point in points:
-                        point[1][j] += by
-            kept = [p for p in self.points if p[0] < at] or self.points[:1]
-            self.points = kept[-200:] + [(at, q, v)] + [p for p in points if p[0] > at]
+            self.follow_on(points, max(now, start) if self.at_stamp else now)
+
+    def pursue(self, message):
+        """A goal's trajectory: when it ends, `None` where it is refused."""
+        now = time.time()
+        with self.lock:
+            self.seen["goals"] += 1
+            points, start = self.wanted(message, now) if self.works() else (None, "it does not work")
+            if points is None:
+                print("refused:", start, flush=True)
+                self.seen["dropped"] += 1
+                return None
+            self.follow_on(points, max(now, start) if self.at_stamp else now)
+            return points[-1][0]
+
+    def give_up(self):
+        """It holds where it is to be."""
+        with self.lock:
+            self.hold(self.desired(time.time())[0])
+
+    def follow_on(self, points, at):
+        """These points from then on, from where it is to be then."""
+        q, v = self.desired(at)
+        for j, turning in enumerate(self.turns):
+            if turning:
+                by = 2 * math.pi * round((q[j] - points[0][1][j]) / (2 * math.pi))
+                for point in points:
+                    point[1][j] += by
+        kept = [p for p in self.points if p[0] < at] or self.points[:1]
+        self.points = kept[-200:] + [(at, q, v)] + [p for p in points if p[0] > at]
 
     def place(self, message):
         now = time.time()
@@ -198,6 +227,69 @@ class Controller(Arm):
                 return
             self.judge(q, v, self.elapsed)
             self.follow(q, v)
+
+
+class Goals:
+    """The controller's action: one goal at a time."""
+
+    def __init__(self, node, arm, name):
+        self.node, self.arm, self.lock = node, arm, threading.Lock()
+        self.current, self.end, self.next = None, 0.0, None
+        self.told = 0.0
+        self.ends = {}
+        self.server = ActionServer(
+            node, FollowJointTrajectory, name + "/follow_joint_trajectory", execute_callback=self.execute,
+            goal_callback=self.asked, handle_accepted_callback=self.accepted,
+            cancel_callback=lambda _: CancelResponse.ACCEPT)
+
+    def asked(self, request):
+        end = self.arm.pursue(request.trajectory)
+        if end is None:
+            return GoalResponse.REJECT
+        self.next = end
+        return GoalResponse.ACCEPT
+
+    def accepted(self, handle):
+        with self.lock:
+            old, self.current, self.end = self.current, handle, self.next
+            self.ends[bytes(handle.goal_id.uuid)] = Future(executor=rclpy.get_global_executor())
+            handle.execute()
+        if old:
+            self.finish(old, "abort", -6, "another goal came")
+
+    async def execute(self, handle):
+        return await self.ends[bytes(handle.goal_id.uuid)]
+
+    def finish(self, handle, how, code, text=""):
+        getattr(handle, how)()
+        result = FollowJointTrajectory.Result(error_code=code, error_string=text)
+        self.ends[bytes(handle.goal_id.uuid)].set_result(result)
+
+    def step(self, now):
+        with self.lock:
+            handle, end = self.current, self.end
+            if handle is None:
+                return
+            if handle.is_cancel_requested:
+                self.arm.give_up()
+                self.current = None
+                how = ("canceled", 0)
+            elif not self.arm.works():
+                self.current = None
+                how = ("abort", -4)
+            elif now >= end + 0.05:
+                self.current = None
+                how = ("succeed", 0)
+            else:
+                if now < self.told + 0.1:
+                    return
+                self.told = now
+                feedback = FollowJointTrajectory.Feedback(joint_names=self.arm.names)
+                feedback.desired.positions, feedback.actual.positions = self.arm.last[0], self.arm.measured
+                feedback.error.positions = [a - b for a, b in zip(self.arm.last[0], self.arm.measured)]
+                handle.publish_feedback(feedback)
+                return
+        self.finish(handle, *how)
 
 
 def main():
@@ -246,12 +338,26 @@ def main():
         return response
 
     node.create_service(SetBool, "/power", on_power)
+
+    def on_list(_, response):
+        state = "active" if arm.active else "inactive"
+        response.controller = [
+            ControllerState(name="joint_state_broadcaster", state="active", claimed_interfaces=[],
+                            type="joint_state_broadcaster/JointStateBroadcaster"),
+            ControllerState(name=args.controller.strip("/"), state=state, is_chainable=True,
+                            claimed_interfaces=[name + "/position" for name in names],
+                            type="joint_trajectory_controller/JointTrajectoryController")]
+        return response
+
+    node.create_service(ListControllers, "/controller_manager/list_controllers", on_list)
     if args.interface == "position":
         subscription = node.create_subscription(
             Float64MultiArray, args.controller + "/commands", arm.place, 10)
     else:
         subscription = node.create_subscription(
             JointTrajectory, args.controller + "/joint_trajectory", arm.take, 10)
+
+    goals = None if args.interface == "position" else Goals(node, arm, args.controller)
 
     def play():
         for line in sys.stdin:
@@ -266,6 +372,8 @@ def main():
                 arm.switch(active=word == "work")
             elif word == "deaf":
                 node.destroy_subscription(subscription)
+                if goals:
+                    goals.server.destroy()
             elif word == "lose":
                 arm.lose = int(rest[0])
 
@@ -299,6 +407,8 @@ def main():
             aim.reference.positions, aim.reference.velocities = arm.last
             aim.feedback.positions = list(arm.measured)
             aims.publish(aim)
+            if goals:
+                goals.step(now)
         if now >= next_state:
             next_state = max(now, next_state + 0.01)
             message = JointState()

@@ -112,7 +112,7 @@ fn a_plan_that_begins_at_speed_needs_one_that_brings_it_there() {
 }
 
 fn given(plan: ValidPlan, start_ns: u64) -> Running {
-    let goal = String::new();
+    let goal = Goal { id: String::new(), start_ns, until_ns: 0, points: Vec::new(), curved: true };
     Running { plan, goal, start_ns, started: true, ended_ns: None, there_ns: None }
 }
 

@@ -15,6 +15,7 @@ mod error;
 mod node;
 mod owner;
 mod plan;
+mod schema;
 mod spoilt;
 mod stream;
 
@@ -26,6 +27,7 @@ pub use error::{IpcError, PortError};
 pub use node::{Ipc, free_shared_memory, within};
 pub use owner::User;
 pub use plan::{PlanPublisher, PlanReceiver, ReceivedPlan};
+pub use schema::{Shape, schema};
 pub use stream::{Newest, Payload, Receiver, Sender};
 
 impl Ipc {

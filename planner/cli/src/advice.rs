@@ -201,7 +201,8 @@ fn publish(error: &PublishError) -> Option<String> {
         }
         PublishError::Lost(_) => {
             "see the executor's last lines for why; it starts no plan from before its own start, so \
-             publish again, or `planner replan`, once `executor ctl status` answers"
+             publish again, or `planner replan`, once `executor ctl status` answers; behind a relay \
+             `relay ask PLAN` says what became of it"
         }
         PublishError::Rejected(event) if event.reason == Reason::Start.wire() => {
             "only a plan of `planner replan`, or of `planner plan --continue PLAN@K`, takes over in \

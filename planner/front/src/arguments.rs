@@ -89,6 +89,9 @@ pub(crate) enum Command {
     /// Start the endpoint that the cell file names, in the folder of that file.
     #[command(disable_help_flag = true)]
     Endpoint(Rest),
+    /// Carry plans, events, telemetry and commands to another host: a program that is installed by itself.
+    #[command(disable_help_flag = true)]
+    Relay(Rest),
     /// A simulated arm that judges every setpoint.
     #[command(disable_help_flag = true)]
     Mock(Rest),

@@ -10,7 +10,7 @@ use nullsweep_cell::{DESCRIBE, Described, FRONT, VARIABLE, beside};
 
 use crate::arguments::Cli;
 use crate::out::write_out;
-use crate::programs::{EXECUTOR, NAME, PLANNER, whole};
+use crate::programs::{EXECUTOR, NAME, PLANNER, RELAY, whole};
 
 /// Writes what a shell completes by to standard output.
 ///
@@ -44,6 +44,9 @@ fn all() -> anyhow::Result<clap::Command> {
     }
     for (program, name) in whole() {
         command = put(command, name.to_owned(), ask(program)?);
+    }
+    if let Ok(relay) = ask(RELAY) {
+        command = put(command, RELAY.to_owned(), relay);
     }
     Ok(command)
 }

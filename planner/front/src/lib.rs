@@ -11,7 +11,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use arguments::{Cli, Command};
-use programs::{EXECUTOR, PLANNER, start, start_endpoint};
+use programs::{EXECUTOR, PLANNER, RELAY, start, start_endpoint};
 
 /// Does what a command line says, program name first. Where another program is started, this does not
 /// return.
@@ -45,6 +45,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Top(rest) => start(EXECUTOR, Some("top"), rest.args),
         Command::Replay(rest) => start(EXECUTOR, Some("replay"), rest.args),
         Command::Endpoint(rest) => start_endpoint(cell, rest.args),
+        Command::Relay(rest) => start(RELAY, None, rest.args),
         Command::Mock(rest) => start("mock-hardware", None, rest.args),
         Command::Demo(rest) => start("demo", None, rest.args),
         Command::Conformance(rest) => start("conformance", None, rest.args),

@@ -10,6 +10,8 @@ use nullsweep_cell::{Cell, FILE_NAME, FRONT, PROGRAMS, VARIABLE, beside, named_i
 
 pub(crate) const PLANNER: &str = "planner";
 pub(crate) const EXECUTOR: &str = "executor";
+/// A workspace of its own, so it may be missing.
+pub(crate) const RELAY: &str = "relay";
 
 /// What the others call this one.
 pub(crate) const NAME: &str = "nullsweep";
@@ -31,18 +33,24 @@ pub(crate) fn start(
     args: Vec<OsString>,
 ) -> anyhow::Result<ExitCode> {
     let shown = whole()
+        .chain([(RELAY, RELAY)])
         .find(|(name, _)| *name == program)
         .map_or(NAME.into(), |(_, command)| format!("{NAME} {command}"));
     let path = beside(program);
     let mut started = Command::new(&path);
     started.arg0(shown).env(FRONT, NAME).args(named(cell)).args(command).args(args);
     let error = started.exec();
-    Err(error).with_context(|| {
-        format!(
+    Err(error).with_context(|| match program {
+        RELAY => format!(
+            "cannot start {}: it is no part of the default build; `cargo install --path relay` installs \
+             it",
+            path.display()
+        ),
+        _ => format!(
             "cannot start {}: `cargo install --path FOLDER` installs it, for each of the folders \
              planner/cli, executor, tests",
             path.display()
-        )
+        ),
     })
 }
 

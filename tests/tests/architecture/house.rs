@@ -77,6 +77,12 @@ pub(crate) const CRATES: &[Crate] = &[
     with("fuzz", &["tests/inputs"]),
     with("pr2-bridge", &["ipc-types", "robot", "robot/cell", "executor", "bridge"]),
     with("ros2-bridge", &["ipc-types", "robot", "robot/cell", "executor", "bridge"]),
+    // Of planner and executor it knows the wire alone; its tests start an executor.
+    Crate {
+        dir: "relay",
+        may: May::Import(&["ipc-types", "robot/cell"]),
+        dev: &["executor", "robot"],
+    },
     // The planner's commands as Python's functions; of the executor it knows the wire alone.
     with(
         "python",
@@ -198,6 +204,7 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
             "tests",
             "pr2-bridge",
             "ros2-bridge",
+            "relay",
         ],
     ),
     ("clap_complete", &["planner/front"]),
@@ -208,6 +215,7 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("serde-saphyr", &["planner/src/poses/read"]),
     ("gcode", &["planner/src/poses/read"]),
     ("mcap", &["planner/report", "planner/cli/tests"]),
+    ("zenoh", &["relay"]),
     ("plotters", &["planner/experiment"]),
     ("comfy-table", &["planner/cli", "planner/experiment", "tests"]),
 ];
@@ -217,7 +225,7 @@ pub(crate) const REFUSALS: &[&str] = &["ViolationKind", "Reason", "Fault"];
 
 /// Programs whose subcommands the documents may name.
 pub(crate) const PROGRAMS: &[&str] =
-    &["planner", "executor", "nullsweep", "pr2-bridge", "ros2-bridge"];
+    &["planner", "executor", "nullsweep", "pr2-bridge", "ros2-bridge", "relay"];
 
 /// The most lines of a file.
 pub(crate) const FILE_LINES: usize = 450;

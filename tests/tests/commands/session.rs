@@ -28,7 +28,7 @@ const WHOLE: [(&str, &str, &str); 6] = [
 ];
 
 /// Commands of the front that start no program of a name of its own.
-const OWN: [&str; 5] = ["endpoint", "doctor", "completions", "man", "help"];
+const OWN: [&str; 6] = ["endpoint", "doctor", "completions", "man", "help", "relay"];
 
 /// A session.
 pub(crate) struct Session {
