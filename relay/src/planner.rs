@@ -432,7 +432,7 @@ impl<'a> PlannerEnd<'a> {
             fault: last.fault,
             knot: last.knot,
             unverified: last.unverified,
-            reserved: 0,
+            stopped: last.stopped,
         }
     }
 }

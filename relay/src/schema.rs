@@ -57,14 +57,14 @@ mod tests {
     fn another_type_or_size_is_told_from_both_sides() {
         let own = Schema::own();
         assert!(own.differences(&Schema::read(own.text())).is_empty());
-        let other = own.text().replace("Telemetry.v4 of 736", "Telemetry.v3 of 704");
+        let other = own.text().replace("Telemetry.v5 of 1000", "Telemetry.v4 of 736");
         let other = Schema::read(&other);
         assert_ne!(own.seal(), other.seal());
         assert_eq!(
             own.differences(&other),
             [
-                "telemetry: nullsweep.Telemetry.v4 of 736 bytes here",
-                "telemetry: nullsweep.Telemetry.v3 of 704 bytes there"
+                "telemetry: nullsweep.Telemetry.v5 of 1000 bytes here",
+                "telemetry: nullsweep.Telemetry.v4 of 736 bytes there"
             ]
         );
         let text = own.text();

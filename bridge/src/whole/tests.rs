@@ -87,7 +87,7 @@ fn a_plan_begins_where_the_arm_is() {
 fn a_plan_that_begins_at_speed_needs_one_that_brings_it_there() {
     let moving = [(0, 0.1, 0.1), (2000, 0.2, 0.0)];
     let alone = plan(2, None, &moving, |_| {});
-    assert_eq!(judge(&alone, None, 0.1), Err(Reason::Start));
+    assert_eq!(judge(&alone, None, 0.1), Err(Reason::Speed));
     let line = |h: &mut PlanHeader| {
         h.interpolation = Interpolation::Linear.wire();
         h.corners = 0;

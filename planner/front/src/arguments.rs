@@ -35,6 +35,9 @@ pub(crate) enum Command {
     /// Make a plan from scans, or from a simulated scan.
     #[command(disable_help_flag = true)]
     Plan(Rest),
+    /// Put the plans of jobs together to a program, or write the next jobs.
+    #[command(disable_help_flag = true)]
+    Join(Rest),
     /// Make a plan through given tool poses, in whatever order is shortest.
     #[command(disable_help_flag = true)]
     Task(Rest),

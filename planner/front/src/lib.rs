@@ -27,6 +27,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Completions { shell } => describe::completions(shell),
         Command::Man { folder } => describe::manuals(&folder),
         Command::Plan(rest) => start(PLANNER, Some("plan"), rest.args),
+        Command::Join(rest) => start(PLANNER, Some("join"), rest.args),
         Command::Task(rest) => start(PLANNER, Some("task"), rest.args),
         Command::Follow(rest) => start(PLANNER, Some("follow"), rest.args),
         Command::Scene(rest) => start(PLANNER, Some("scene"), rest.args),

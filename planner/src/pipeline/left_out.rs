@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::other::FreeFrom;
+use crate::plan::Left;
 use crate::workcell::{Cause, Workcell, obstruction};
 
 /// All that one cause keeps from being swept.
@@ -32,6 +33,13 @@ pub struct LeftOut {
     /// The points, as indices into the scan, ascending.
     #[serde(skip)]
     pub points: Vec<u32>,
+}
+
+impl LeftOut {
+    /// As a plan file tells it.
+    pub(super) fn told(&self) -> Left {
+        Left { cause: self.cause.to_string(), points: self.points.clone() }
+    }
 }
 
 impl std::fmt::Display for LeftOut {

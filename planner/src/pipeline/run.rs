@@ -18,7 +18,7 @@ use super::start::{rest_before, start};
 use super::swept::{points_of, swept_before, without_swept};
 use crate::cost;
 use crate::motion::Memo;
-use crate::plan::{Left, Plan};
+use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::roadmap::Graph;
 use crate::sweep::{Held, passes};
@@ -122,8 +122,7 @@ pub fn run(
     };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
     let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
-    let of = |row: &LeftOut| Left { cause: row.cause.to_string(), points: row.points.clone() };
-    plan.left = left_out.iter().map(of).collect();
+    plan.left = left_out.iter().map(LeftOut::told).collect();
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {
