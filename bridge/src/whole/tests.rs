@@ -102,8 +102,8 @@ fn a_plan_that_begins_at_speed_needs_one_that_brings_it_there() {
     };
     assert_eq!(joins(1, &moving), Ok(start + 2000 * MS));
     // It is there at another speed, elsewhere, or too late.
-    assert_eq!(joins(1, &[(0, 0.1, 0.0), (2000, 0.2, 0.0)]), Err(Reason::Start));
-    assert_eq!(joins(1, &[(0, 0.1, -0.1), (2000, 0.1, 0.0)]), Err(Reason::Start));
+    assert_eq!(joins(1, &[(0, 0.1, 0.0), (2000, 0.2, 0.0)]), Err(Reason::Speed));
+    assert_eq!(joins(1, &[(0, 0.1, -0.1), (2000, 0.1, 0.0)]), Err(Reason::Speed));
     assert_eq!(joins(1, &[(0, 0.11, 0.1), (2000, 0.2, 0.0)]), Err(Reason::Start));
     assert_eq!(joins(0, &[(0, 0.0, 0.0), (2000, 0.2, 0.0)]), Err(Reason::JoinKnot));
     assert_eq!(joins(7, &moving), Err(Reason::JoinKnot));
