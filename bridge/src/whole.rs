@@ -205,6 +205,8 @@ impl Whole {
         if now >= self.told_ns + TELL_NS {
             self.told_ns = now;
             self.show(ready, now)?;
+            // Who came since the last event gets the last ones.
+            self.events.connect()?;
         }
         Ok(asks)
     }

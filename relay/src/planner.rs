@@ -229,7 +229,8 @@ impl<'a> PlannerEnd<'a> {
         self.link.look();
         self.keep_up();
         self.place()?;
-        if self.world.is_some() {
+        if let Some(world) = &self.world {
+            world.connect()?;
             self.plans()?;
             self.orders()?;
         }

@@ -42,6 +42,14 @@ impl World {
         self.events.send(&PlanEvent { sequence: self.told, stamp_ns, ..*event }).map(|_| ())
     }
 
+    /// Hands the last events to who came since the last one.
+    ///
+    /// # Errors
+    /// A port that failed.
+    pub fn connect(&self) -> Result<(), PortError> {
+        self.events.connect()
+    }
+
     /// Tells how the executor is.
     ///
     /// # Errors
