@@ -160,8 +160,8 @@ impl Seam<'_> {
 ///
 /// # Errors
 /// [`Reason::Start`] with the joint and by how much it is off in place \[rad\], [`Reason::Speed`] the
-/// same in velocity \[rad/s\], [`Reason::SoftLimit`] for a first knot too near a limit to be reached with the braking
-/// margin, [`Reason::Jerk`] where its acceleration begins with too large a step.
+/// same in velocity \[rad/s\], [`Reason::SoftLimit`] for a first knot too near a limit to be reached
+/// with the braking margin, [`Reason::Jerk`] where its acceleration begins with too large a step.
 pub fn starts_at(plan: &ValidPlan, holds: &JointVector, guard: &Guard) -> Result<(), Rejection> {
     let Some(first) = plan.knots().first() else { return Ok(()) };
     at(holds, &first.q, guard.start_tolerance, guard)?;

@@ -1,17 +1,16 @@
 //! The endpoint's loop: states out as they come, setpoints in, messages to the controller.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use anyhow::Context;
 use nullsweep_bridge::{Do, Ear, Endpoint, Player};
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::args::{Common, Interface, RunArgs};
 use crate::link::Link;
+use crate::signals;
 use crate::ticks::Ticks;
 use crate::told::{DEAF, Told, health, heard};
 use crate::trajectory::{positions, trajectory};
@@ -24,10 +23,7 @@ const ROUND: Duration = Duration::from_micros(500);
 pub fn run(common: &Common, args: &RunArgs) -> anyhow::Result<()> {
     let arm = args.arm.load()?;
     let rename = args.arm.names(&arm)?;
-    let done = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&done))?;
-    }
+    let done = signals::done()?;
     // Before the ROS side's threads are made, which inherit it. Where it is denied messages are
     // only later now and then.
     let _ = become_real_time(args.priority, None);

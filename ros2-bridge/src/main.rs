@@ -17,6 +17,7 @@ mod pictures;
 mod scan;
 mod serve;
 mod show;
+mod signals;
 mod threads;
 mod ticks;
 mod told;

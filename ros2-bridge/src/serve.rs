@@ -5,8 +5,7 @@
 //! A goal that comes while another one runs takes its place: the arm is stopped on its path, and goes
 //! from there to the first point whose time is not past, as fast as its joints may.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
@@ -20,13 +19,13 @@ use nullsweep_ipc_types::{
 use nullsweep_robot::{Arm, JointVector};
 use ros2_client::action::GoalId;
 use ros2_client::service::RmwRequestId;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::args::{Common, ServeArgs};
 use crate::brake::{Answer, Brake};
 use crate::door::{Door, Wanted};
 use crate::goals::{Goals, Status};
 use crate::messages::{FollowResult, JointTrajectory};
+use crate::signals;
 use crate::wish::{Wish, waypoints};
 
 /// Time between two looks.
@@ -57,10 +56,7 @@ struct Running {
 
 /// Runs until SIGINT or SIGTERM.
 pub fn run(common: &Common, args: &ServeArgs) -> anyhow::Result<()> {
-    let done = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&done))?;
-    }
+    let done = signals::done()?;
     let arm = args.load()?;
     let rename = args.arm.names(&arm)?;
     let names: Vec<String> = arm.joint_names().iter().map(|name| rename(name)).collect();

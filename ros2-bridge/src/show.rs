@@ -2,8 +2,7 @@
 //! executor's telemetry, beside whatever moves the arm.
 
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, ensure};
@@ -12,12 +11,12 @@ use nullsweep_ipc_types::{JointArray, Telemetry};
 use nullsweep_robot::{Arm, JointVector};
 use ros2_client::qos::Durability;
 use serde::Deserialize;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::args::{Common, ShowArgs};
 use crate::domain::{absolute, join, reliable, spin, topic};
 use crate::messages::{Header, JointState, Transform};
 use crate::pictures::{Color, Frames, Marker, Markers, TransformStamped};
+use crate::signals;
 use crate::threads::Threads;
 use crate::trajectory::ros_time;
 
@@ -49,10 +48,7 @@ struct Knot {
 
 /// Runs until SIGINT or SIGTERM.
 pub fn run(common: &Common, args: &ShowArgs) -> anyhow::Result<()> {
-    let done = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&done))?;
-    }
+    let done = signals::done()?;
     let arm = args.load()?;
     let rename = args.arm.names(&arm)?;
     let names: Vec<String> = arm.joint_names().iter().map(|name| rename(name)).collect();
