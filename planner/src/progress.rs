@@ -19,9 +19,9 @@ pub fn left_out([thing, things]: [&str; 2], which: &[usize], why: &str) -> Strin
     let numbers: Vec<String> = which.iter().take(LISTED).map(ToString::to_string).collect();
     let numbers = numbers.join(", ");
     match which.len() {
-        1 => format!("{thing} {numbers} is left out: {why}"),
-        n if n <= LISTED => format!("{n} {things} are left out ({numbers}): {why}"),
-        n => format!("{n} {things} are left out ({numbers}, …): {why}"),
+        1 => format!("{thing} {numbers} (from 0 on) is left out: {why}"),
+        n if n <= LISTED => format!("{n} {things} are left out ({numbers}, from 0 on): {why}"),
+        n => format!("{n} {things} are left out ({numbers}, …, from 0 on): {why}"),
     }
 }
 
@@ -37,9 +37,12 @@ impl Progress for Silent {
 
 #[test]
 fn many_are_told_in_one_line() {
-    assert_eq!(left_out(["patch", "patches"], &[7], "why"), "patch 7 is left out: why");
-    assert_eq!(left_out(["pose", "poses"], &[1, 2], "why"), "2 poses are left out (1, 2): why");
+    assert_eq!(left_out(["patch", "patches"], &[7], "why"), "patch 7 (from 0 on) is left out: why");
+    assert_eq!(
+        left_out(["pose", "poses"], &[1, 2], "why"),
+        "2 poses are left out (1, 2, from 0 on): why"
+    );
     let many: Vec<usize> = (0..50).collect();
     let text = left_out(["pose", "poses"], &many, "why");
-    assert_eq!(text, "50 poses are left out (0, 1, 2, 3, 4, 5, 6, 7, …): why");
+    assert_eq!(text, "50 poses are left out (0, 1, 2, 3, 4, 5, 6, 7, …, from 0 on): why");
 }

@@ -46,3 +46,21 @@ fn no_part_of_a_robot_is_inside_a_closed_mesh() {
         assert_eq!(free, [!lid; 4], "closed: {lid}");
     }
 }
+
+/// The points that are drawn on a mesh hold none of its corners, where a tool would hit it first.
+#[test]
+fn the_corners_of_a_mesh_are_in_the_way() {
+    // A spike of 0.2 m on a foot of 0.3 m, 5 mm wide.
+    let text = "v 0 0 0\nv 0.3 0 0\nv 0.3 0.3 0\nv 0 0.3 0\n\
+                v 0.1 0.1 0\nv 0.105 0.1 0\nv 0.1 0.1 0.2\nf 1 2 3 4\nf 5 6 7\n";
+    let options = ReadOptions::default();
+    let raw = read_bytes(text.as_bytes(), Format::Obj, Path::new("spike"), &options);
+    let pose = Isometry3::identity();
+    let (placed, _) = place(&raw.expect("a mesh"), &Placement::Frame { pose, sensor: None });
+    let (scene, _) = Scene::seen(&placed, None, &CleanConfig::default()).expect("a surface");
+    for tip in [[0.1, 0.1, 0.2], [0.3, 0.3, 0.0]].map(nalgebra::Point3::from) {
+        let known = scene.raw.iter().chain(&scene.surroundings);
+        let near = known.map(|p| (p - tip).norm()).fold(f64::INFINITY, f64::min);
+        assert!(near < 1e-9, "{tip}: {near} m");
+    }
+}

@@ -43,6 +43,7 @@ fn way(from: JointVector, to: JointVector, profile: Profile) -> Result<Plan, Tra
         stance: stance(),
         from,
         to,
+        unwinds: false,
         profile,
         v_max: None,
         collision: Options::default(),

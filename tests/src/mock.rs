@@ -197,7 +197,7 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
         endpoint: endpoint.counters(),
         own_late_cycles,
         swept: plan.as_ref().map(|plan| swept(plan, &arm, recorder.postures())),
-        tracking: recorder.tracking(),
+        tracking: recorder.tracking(&arm),
     };
     if let Some(path) = &args.record {
         let file = File::create(path)

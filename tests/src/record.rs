@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use nullsweep_ipc_types::{PlanId, Setpoint};
-use nullsweep_robot::JointVector;
+use nullsweep_robot::{Arm, JointVector};
 
 use crate::tracking::Tracking;
 
@@ -64,12 +64,13 @@ impl Recorder {
         self.samples.iter().map(|s| s.positions)
     }
 
-    /// How the arm followed while plans ran; `None` if none did.
+    /// How the arm followed while plans ran, whole turns of joints without end aside: an endpoint that was
+    /// started anew counts them from 0. `None` if none did.
     #[must_use]
-    pub fn tracking(&self) -> Option<Tracking> {
+    pub fn tracking(&self, arm: &Arm) -> Option<Tracking> {
         let off = |s: &Sample| {
-            let joints = s.positions.iter().zip(&s.commanded);
-            joints.map(|(q, wanted)| (q - wanted).abs()).fold(0.0, f64::max)
+            let apart = arm.continuous().displacement(&s.commanded, &s.positions);
+            apart.iter().map(|apart| apart.abs()).fold(0.0, f64::max)
         };
         Tracking::of(self.samples.iter().filter(|s| s.plan != PlanId::NONE).map(off).collect())
     }
@@ -98,6 +99,8 @@ impl Recorder {
 
 #[cfg(test)]
 mod tests {
+    use nullsweep_robot::{ArmSpec, Robot, Side};
+
     use super::*;
 
     #[test]
@@ -115,5 +118,21 @@ mod tests {
         assert_eq!(lines[0], "time_s,plan,knot,a,b,a_commanded,b_commanded");
         assert_eq!(lines[2], "0.0050,0/0,0,0.000000,5.000000,0.000000,5.000000");
         assert_eq!(lines.len(), 4);
+    }
+    #[test]
+    fn whole_turns_are_no_error() {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&ArmSpec::pr2(Side::Right)).expect("an arm");
+        let mut recorder = Recorder::new(1);
+        let plan = PlanId { epoch: 1, number: 1 };
+        let mut setpoint = Setpoint { plan, ..bytemuck::Zeroable::zeroed() };
+        assert!(arm.continuous().is(6) && !arm.continuous().is(0));
+        setpoint.positions[6] = -4.0 * std::f64::consts::TAU + 0.001;
+        recorder.offer(1, &JointVector::ZERO, Some(&setpoint));
+        let found = recorder.tracking(&arm).expect("one");
+        assert!((found.max - 0.001).abs() < 1e-9, "{found:?}");
+        setpoint.positions[0] = 0.5;
+        recorder.offer(2, &JointVector::ZERO, Some(&setpoint));
+        assert_eq!(recorder.tracking(&arm).expect("two").max, 0.5);
     }
 }

@@ -98,9 +98,13 @@ fn motion(t: &Telemetry, length: Option<f64>) -> Line<'static> {
     } else {
         "no plan".into()
     };
-    let speed = t.speed_scale * 100.0;
+    // Without a plan nothing goes at any speed.
+    let speed = match t.plan.is_some() {
+        true => format!("  speed {:.0} %", t.speed_scale * 100.0),
+        false => String::new(),
+    };
     let (cycle, missed) = (t.cycle, t.missed_cycles);
-    Line::raw(format!("{plan}  speed {speed:.0} %  cycle {cycle}, {missed} missed"))
+    Line::raw(format!("{plan}{speed}  cycle {cycle}, {missed} missed"))
 }
 
 fn draw_joints(frame: &mut Frame<'_>, area: Rect, joints: &[Joint], t: &Telemetry) {

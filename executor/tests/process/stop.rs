@@ -179,6 +179,8 @@ fn behind_a_front_it_speaks_of_the_front() {
         let output = ctl.env(nullsweep_cell::FRONT, front).output().unwrap();
         let text = said(&output);
         assert!(text.contains(own) && text.contains(run), "{text}");
+        // Which of several worlds it has looked into.
+        assert!(text.contains(here) && text.contains("--ipc-root"), "{text}");
     }
 }
 

@@ -1,5 +1,6 @@
 //! Commands: a question to the executor and its answer.
 
+use std::path::{Path, PathBuf};
 use std::string::String;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -27,6 +28,7 @@ pub struct CommandClient {
     client: Client<ipc::Service, Command, (), Response, ()>,
     service: Service,
     robot: String,
+    root: Option<PathBuf>,
 }
 
 impl CommandClient {
@@ -38,7 +40,12 @@ impl CommandClient {
                 .backpressure_strategy(BackpressureStrategy::DiscardData)
                 .create()
         })?;
-        Ok(Self { client, service, robot: ipc.robot().into() })
+        Ok(Self {
+            client,
+            service,
+            robot: ipc.robot().into(),
+            root: ipc.root().map(Path::to_path_buf),
+        })
     }
 
     /// Asks and waits for the answer, at most `timeout`. `value` is the argument of
@@ -67,7 +74,7 @@ impl CommandClient {
 
     /// Asks and does not wait. A client may have [`COMMAND_REQUESTS`] questions open.
     pub fn ask(&self, kind: CommandKind, value: f64) -> Result<Asked, IpcError> {
-        let absent = || IpcError::NoExecutor { robot: self.robot.clone() };
+        let absent = || IpcError::NoExecutor { robot: self.robot.clone(), root: self.root.clone() };
         if self.service.dynamic_config().number_of_servers() == 0 {
             return Err(absent());
         }

@@ -28,11 +28,15 @@ use super::spoilt::Spoilt;
 pub enum IpcError {
     /// Nobody answers for this robot.
     #[error(
-        "no executor is running for robot `{robot}`: start `executor run --robot-name {robot}`"
+        "no executor is running for robot `{robot}` under {}: start `executor run --robot-name \
+         {robot}`; one under another root path is found by --ipc-root, or by a cell file's ipc_root",
+        shown(.root)
     )]
     NoExecutor {
         /// The robot's name.
         robot: String,
+        /// The root path, `None` for the default.
+        root: Option<PathBuf>,
     },
     /// The service's only place is taken.
     #[error(

@@ -1,5 +1,6 @@
 //! Plans: published with their knots in place, received as a borrowed sample.
 
+use std::path::{Path, PathBuf};
 use std::string::String;
 
 use iceoryx2::port::publisher::Publisher;
@@ -23,6 +24,7 @@ pub struct PlanPublisher {
     publisher: Publisher<ipc::Service, [Knot], PlanHeader>,
     service: PortFactory<ipc::Service, [Knot], PlanHeader>,
     robot: String,
+    root: Option<PathBuf>,
     max_knots: usize,
     published: u64,
 }
@@ -42,7 +44,8 @@ impl PlanPublisher {
                 .allocation_strategy(AllocationStrategy::Static)
                 .create()
         })?;
-        Ok(Self { publisher, service, robot: ipc.robot().into(), max_knots, published: 0 })
+        let (robot, root) = (ipc.robot().into(), ipc.root().map(Path::to_path_buf));
+        Ok(Self { publisher, service, robot, root, max_knots, published: 0 })
     }
 
     /// Gives the plan its id (the present time and this publisher's count) and its checksum,
@@ -64,7 +67,7 @@ impl PlanPublisher {
             return Err(IpcError::KnotCount { knots: knots.len(), limit: self.max_knots });
         }
         if !self.has_executor() {
-            return Err(IpcError::NoExecutor { robot: self.robot.clone() });
+            return Err(self.absent());
         }
         // Twice the plan: the page of another process may be filled between asking and filling.
         need_shared_memory(2 * size_of_val(knots) as u64)?;
@@ -75,9 +78,13 @@ impl PlanPublisher {
         let sample = sample.write_from_slice(knots);
         match sample.send().map_err(|e| port(e.into()))? {
             0 if self.has_executor() => Err(IpcError::PlanBufferFull),
-            0 => Err(IpcError::NoExecutor { robot: self.robot.clone() }),
+            0 => Err(self.absent()),
             _ => Ok(()),
         }
+    }
+
+    fn absent(&self) -> IpcError {
+        IpcError::NoExecutor { robot: self.robot.clone(), root: self.root.clone() }
     }
 
     /// Whether an executor listens for plans.

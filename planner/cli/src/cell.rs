@@ -276,7 +276,10 @@ impl CheckArgs {
         put("Which links may touch.", "srdf", srdf, "\"robot.srdf\"");
         let capsules = files.fit_capsules.map(|r| r.to_string());
         put("Capsules of this radius where meshes are missing.", "fit_capsules", capsules, "0.05");
-        put("Folder that keeps its services apart.", "ipc_root", None, "\"/run/user/1000/cell\"");
+        // It need not be there yet.
+        let root = self.site.site().root.map(std::path::absolute).transpose()?;
+        let root = root.map(|root| quoted(&root.display().to_string()));
+        put("Folder that keeps its services apart.", "ipc_root", root, "\"/run/user/1000/cell\"");
         let endpoint = "[\"mock-hardware\"]";
         put("What `nullsweep endpoint` starts.", "endpoint", Some(endpoint.into()), "");
         let _ = writeln!(text, "\n# Where `package://NAME/` is.\n[packages]");

@@ -42,6 +42,10 @@ pub(super) struct GotoArgs {
     /// The tool, a TOML file, without a plan; else a sponge of 0.10 × 0.07 m.
     #[arg(long, value_name = "FILE", conflicts_with = "plan")]
     tool: Option<PathBuf>,
+    /// Turn joints without end back to the posture's own angle, by the whole turns that sweeping has
+    /// wound them up by: for hoses and cables.
+    #[arg(long)]
+    unwind: bool,
     #[command(flatten)]
     robot: RobotArgs,
     #[command(flatten)]
@@ -66,6 +70,7 @@ pub(super) fn run(args: &GotoArgs) -> anyhow::Result<u8> {
         Some(plan) => Way::of(plan, &args.robot, args.site.site(), &scans),
         None => args.standing(&scans)?,
     };
+    let way = Way { unwinds: args.unwind, ..way };
     let arm = way.arm()?;
     let to = match (&target, &plan) {
         (Some(posture), _) => posture.resolve(&arm, &args.robot, args.site.site(), &bars)?,
@@ -147,6 +152,7 @@ impl GotoArgs {
             stance: place.stance(held),
             tool: self.tool.as_deref().map_or(Ok(Tool::default()), tool_file)?,
             plan: None,
+            unwinds: false,
         })
     }
 }

@@ -44,8 +44,11 @@ struct Summary {
     fingerprint: String,
     base: [f64; 3],
     base_height: f64,
-    method: String,
-    cost: String,
+    /// None of given poses, which no method orders and no cost of these.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    method: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cost: Option<String>,
     seed: u64,
     /// Whether it is as it was verified; if not, why.
     verified: bool,
@@ -138,8 +141,8 @@ fn summarise(plan: &Plan) -> Summary {
         fingerprint: format!("{:016x}", plan.fingerprint),
         base: plan.base,
         base_height: plan.base_height,
-        method: format!("{:?}", plan.method),
-        cost: format!("{:?}", plan.cost),
+        method: (!plan.is_of_poses()).then(|| format!("{:?}", plan.method)),
+        cost: (!plan.is_of_poses()).then(|| format!("{:?}", plan.cost)),
         seed: plan.seed,
         verified: plan.check_seal().is_ok(),
         unverified_because: plan.check_seal().err().map(|why| why.to_string()),
@@ -163,10 +166,16 @@ fn tables(s: &Summary) -> String {
     if s.base_height != 0.0 {
         plan.add_row(["base above the floor", &format!("{:.3} m", s.base_height)]);
     }
-    plan.add_row(["method, cost, seed", &format!("{}, {}, {}", s.method, s.cost, s.seed)]);
+    match (&s.method, &s.cost) {
+        (Some(method), Some(cost)) => {
+            plan.add_row(["method, cost, seed", &format!("{method}, {cost}, {}", s.seed)])
+        }
+        _ => plan.add_row(["seed", &s.seed.to_string()]),
+    };
     plan.add_row(["verified", s.unverified_because.as_deref().map_or("yes", |why| why)]);
     plan.add_row(["knots (on the surface)", &format!("{} ({})", s.knots, s.knots_on_surface)]);
-    plan.add_row(["patches visited", &s.patches_visited.to_string()]);
+    let visited = if s.method.is_some() { "patches visited" } else { "poses met" };
+    plan.add_row([visited, &s.patches_visited.to_string()]);
     plan.add_row(["duration", &format!("{:.2} s", s.duration_s)]);
     plan.add_row(["effort", &format!("{:.2} rad", s.effort_rad)]);
     for [name, value] in s.pace.as_ref().map(pace_rows).unwrap_or_default() {

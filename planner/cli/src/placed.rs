@@ -162,6 +162,16 @@ fn together(
             });
             if args.up.is_none() && stated.is_none() {
                 bars.note("up is taken to be 0,0,1 in the file's frame: --up says what it is");
+                if let Some(up) = room::held(first) {
+                    bars.note(&format!(
+                        "{}: all of it lies before its origin, as a depth camera there sees it: if one \
+                         did, the scan now lies on its back, and --up {},{},{} is right for a camera \
+                         held level (--object finds gravity by itself, where a floor or a table is \
+                         seen)",
+                        path.display(),
+                        up.x, up.y, up.z
+                    ));
+                }
             }
             if args.sensor_height.is_some() && first.sensor.is_none() {
                 note_unseen(path, "--sensor-height is", bars);
@@ -184,12 +194,22 @@ fn together(
         }
         _ => first,
     };
+    let placed = scan::place(whole, &placement).1;
+    if let Placement::Up { up, support_height } = &placement {
+        // Only where the file says nothing else of it.
+        let height = (placed * Point3::origin()).z - support_height;
+        let [x, y, z] = up.into_inner().into();
+        bars.note(&format!(
+            "the scan's lowest points are taken to stand on the floor, or on its support: the file's \
+             origin is then {height:.3} m above it along {x:.4},{y:.4},{z:.4} (--sensor-height says it)"
+        ));
+    }
     let below = scan::below_support(whole, &placement);
     if below > 0 {
         let path = path.display();
         bars.note(&format!("{path}: {below} points alone below all others: nothing rests on them"));
     }
-    Ok((scan::place(whole, &placement).1, is_seen))
+    Ok((placed, is_seen))
 }
 
 /// Tells where a scan shows large planes, and none that is level by what is taken to be up.

@@ -53,6 +53,10 @@ impl SceneArgs {
     }
 
     /// The solid things that are placed.
+    pub(super) fn has_obstacles(&self) -> bool {
+        self.obstacles.is_some()
+    }
+
     pub(super) fn obstacles(&self) -> anyhow::Result<Vec<Obstacle>> {
         self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)
     }
@@ -82,6 +86,13 @@ enum UnseenArg {
     Forbid,
     /// It is free.
     Free,
+}
+
+/// The floor, and the solid things that are placed.
+pub(super) fn bare(args: &SceneArgs) -> anyhow::Result<Scene> {
+    let mut floor = Scene::empty();
+    floor.obstacles.extend(args.obstacles()?);
+    Ok(floor)
 }
 
 /// Reads and joins the scans, or simulates `demo`'s with the noise of `seed`, and cleans them.

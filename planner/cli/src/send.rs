@@ -126,6 +126,20 @@ fn apart(plan: &Plan, arm: &Arm, now: &Posture, bound: f64) -> Vec<String> {
     far.map(|((j, name), apart)| format!("{name} by {apart:.3} {}", unit(arm, j))).collect()
 }
 
+/// Joints without end that stand whole turns from 0, and what to do.
+fn wound(arm: &Arm, now: &Posture) -> Vec<String> {
+    let joints = arm.joint_names().iter().enumerate();
+    let turning = joints.filter(|(j, _)| arm.continuous().is(*j));
+    let wound = turning.filter_map(|(j, name)| {
+        let turns = (now.q[j] / std::f64::consts::TAU).round();
+        let s = if turns.abs() == 1.0 { "" } else { "s" };
+        (turns != 0.0).then(|| {
+            format!("{name} by {turns:+.0} turn{s}: `planner goto home --unwind` turns it back")
+        })
+    });
+    wound.collect()
+}
+
 /// What a plan will do, a line each.
 pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> String {
     let mut text = String::new();
@@ -143,6 +157,9 @@ pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> 
             far => far.iter().enumerate().for_each(|(i, far)| {
                 line(if i == 0 { "starts" } else { "" }, &format!("away: {far}"));
             }),
+        }
+        for wound in wound(arm, now) {
+            line("wound up", &wound);
         }
         if !apart(plan, arm, now, BRIDGED).is_empty() {
             line("", "farther than an executor goes by itself: --goto brings it there");
@@ -169,7 +186,12 @@ pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> 
         Err(why) => line("warning", &why.to_string()),
     }
     line("takes", &format!("{:.1} s at full speed", plan.duration()));
-    if let Some([reachable, all]) = arm.and_then(|arm| swept(plan, arm)) {
+    if plan.is_of_poses() {
+        let mut met: Vec<u32> = plan.knots.iter().filter_map(|knot| knot.patch).collect();
+        met.sort_unstable();
+        met.dedup();
+        line("meets", &format!("{} of {} poses", met.len(), plan.patches.len()));
+    } else if let Some([reachable, all]) = arm.and_then(|arm| swept(plan, arm)) {
         let share = |share: f64| format!("{:.1} %", 100.0 * share);
         let (reachable, all) = (share(reachable), share(all));
         line("sweeps", &format!("{reachable} of what is reachable, {all} of all points"));

@@ -22,7 +22,7 @@ use crate::output::{complain, say, writable};
 use crate::picture::{Sitter, picture};
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
-use crate::scene::{Demo, SceneArgs, scene};
+use crate::scene::{Demo, SceneArgs, bare, scene};
 use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
@@ -167,9 +167,7 @@ impl AgainstArgs {
             let choice = swept.map_or_else(|| self.scene.clone(), |point| self.scene.or_at(point));
             scene(&choice, None, std::slice::from_ref(file), seed, bars)?
         } else if self.demo.is_none() && self.scans.is_empty() {
-            let mut floor = Scene::empty();
-            floor.obstacles.extend(self.scene.obstacles()?);
-            floor
+            bare(&self.scene)?
         } else {
             scene(&self.scene, self.demo, &self.scans, seed, bars)?
         };

@@ -20,7 +20,7 @@ use crate::output::{say, tell, writable};
 use crate::picture::{self, Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
 use crate::robot::{RobotArgs, differs, tool_file};
-use crate::scene::{Demo, SceneArgs, scene};
+use crate::scene::{Demo, SceneArgs, bare, scene};
 use crate::scene_command;
 
 #[derive(Debug, Args)]
@@ -57,6 +57,9 @@ pub(super) struct ViewArgs {
 
 pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
+    if let Some(absent) = args.files.iter().find(|file| !file.exists()) {
+        return Err(Usage(format!("{}: there is no such file", absent.display())).into());
+    }
     let out = args.out.clone().unwrap_or_else(|| beside(args.files.first()));
     writable(&out)?;
     args.mcap.as_deref().map_or(Ok(()), writable)?;
@@ -148,13 +151,14 @@ fn of_plans(
     let robot = args.robot.robot()?;
     let arm = arm(args, &robot, plan)?;
     let collision = args.robot.collision();
-    let is_given = args.demo.is_some() || !scans.is_empty();
-    let scene = is_given
-        .then(|| {
-            bars.stage("scan", None);
-            scene(&args.scene, args.demo, scans, args.seed.unwrap_or(plan.seed), bars)
-        })
-        .transpose()?;
+    let scene = if args.demo.is_some() || !scans.is_empty() {
+        bars.stage("scan", None);
+        Some(scene(&args.scene, args.demo, scans, args.seed.unwrap_or(plan.seed), bars)?)
+    } else if plan.is_of_poses() && args.scene.has_obstacles() {
+        Some(bare(&args.scene)?)
+    } else {
+        None
+    };
     let verification = match &scene {
         None => None,
         Some(scene) => {

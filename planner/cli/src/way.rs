@@ -27,7 +27,7 @@ pub(super) struct WayArgs {
     /// What is around the arm is a simulated scan.
     #[arg(long, value_enum)]
     demo: Option<Demo>,
-    /// Nothing is around the arm but the floor, and what a plan is to sweep.
+    /// Nothing is around the arm but the floor, what a plan is to sweep, and --obstacles.
     #[arg(long, conflicts_with = "demo")]
     empty: bool,
     #[command(flatten)]
@@ -51,6 +51,8 @@ pub(super) struct Way<'a> {
     pub(super) stance: Stance,
     pub(super) tool: Tool,
     pub(super) plan: Option<&'a Plan>,
+    /// Whether whole turns of continuous joints are taken back.
+    pub(super) unwinds: bool,
 }
 
 impl<'a> Way<'a> {
@@ -63,7 +65,8 @@ impl<'a> Way<'a> {
     ) -> Self {
         let held = plan.held.iter().map(|h| (h.name.clone(), h.position)).collect();
         let stance = Stance { base: plan.base, height: plan.base_height, held };
-        Self { robot, site, scans, stance, tool: plan.tool.clone(), plan: Some(plan) }
+        let (tool, plan) = (plan.tool.clone(), Some(plan));
+        Self { robot, site, scans, stance, tool, plan, unwinds: false }
     }
 
     /// The arm, its held joints in place.
@@ -98,6 +101,7 @@ impl WayArgs {
             stance: way.stance.clone(),
             from: now.q,
             to,
+            unwinds: way.unwinds,
             profile: Profile::from(self.profile),
             v_max: self.v_max,
             collision: way.robot.collision(),
@@ -127,13 +131,23 @@ impl WayArgs {
             )
             .into());
         }
-        if self.empty {
-            return Ok(swept.map_or_else(Scene::empty, surface_of));
+        let is_bare = self.demo.is_none() && way.scans.is_empty();
+        if self.empty || (is_bare && self.scene.has_obstacles()) {
+            if way.plan.is_some_and(Plan::is_of_poses) && !self.scene.has_obstacles() {
+                bars.note(
+                    "a plan of given poses does not say what stood around it: give its --obstacles \
+                     again, or they are driven through",
+                );
+            }
+            let mut scene = swept.map_or_else(Scene::empty, surface_of);
+            scene.obstacles.extend(self.scene.obstacles()?);
+            return Ok(scene);
         }
-        if self.demo.is_none() && way.scans.is_empty() {
+        if is_bare {
             return Err(Usage(
-                "what is around the arm? Give the scans (as they were given to `plan`), --demo, or \
-                 --empty where nothing is there but the floor and what the plan sweeps"
+                "what is around the arm? Give the scans (as they were given to `plan`), --demo, \
+                 --obstacles FILE, or --empty where nothing is there but the floor and what the plan \
+                 sweeps"
                     .into(),
             )
             .into());

@@ -152,6 +152,13 @@ fn a_plan_takes_over_from_another_in_its_knot() {
     let c = write(folder.path(), "c.json", &second);
     let (_, data) = page(folder.path(), "after.html", &[a, c.to_str().unwrap()]);
     assert_eq!(starts(&data), [0.0, first.duration()]);
+    // One that was stopped is left in the last knot that was passed.
+    second.past = first.followed(20);
+    let d = write(folder.path(), "d.json", &second);
+    let (_, data) = page(folder.path(), "stopped.html", &[a, d.to_str().unwrap()]);
+    let times = floats(&data["plans"][0]["times"]);
+    assert_eq!((starts(&data)[1], times.len()), (6.0, 21));
+    assert!((times[20] - 6.0).abs() < 1e-6);
 }
 
 #[test]

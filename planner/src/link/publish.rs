@@ -54,7 +54,7 @@ pub enum PublishError {
     #[error("the executor did not answer within {0:?}")]
     NoAdmission(Duration),
     /// The executor refused it.
-    #[error("rejected: {}", describe(.0))]
+    #[error("{}", describe(.0))]
     Rejected(Box<PlanEvent>),
     /// It did not end in time.
     #[error("the plan has not ended within {0:?}")]
@@ -63,8 +63,15 @@ pub enum PublishError {
     #[error("{0}")]
     Lost(Box<Lost>),
     /// It was ended early.
-    #[error("ended early: {}", describe(.0))]
+    #[error("{}", ended(.0))]
     EndedEarly(Box<PlanEvent>),
+}
+
+/// How a plan ended before its own end: that another one took over may well be what was wanted.
+fn ended(event: &PlanEvent) -> String {
+    let replaced = event.kind == EventKind::Superseded.wire();
+    let how = if replaced { "not gone through to its end" } else { "ended early" };
+    format!("{how}: {}", describe(event))
 }
 
 /// Who is told what becomes of a plan.
@@ -108,7 +115,11 @@ pub fn publish(
         Join::Knot => {
             let at = plan.continues.as_ref().ok_or(PublishError::ContinuesNothing)?;
             if !publisher.has_executor() {
-                return Err(IpcError::NoExecutor { robot: robot.into() }.into());
+                return Err(IpcError::NoExecutor {
+                    robot: robot.into(),
+                    root: root.map(Path::to_path_buf),
+                }
+                .into());
             }
             header.join_plan = running(&ipc, patience.admission)?;
             header.join_knot = at.knot;

@@ -68,6 +68,17 @@ pub enum TransitError {
     /// There is nothing to do.
     #[error("the arm is there already")]
     Arrived,
+    /// It would touch something as it turns back.
+    #[error(
+        "{joint} cannot be turned back by {turns} whole turns where the arm is to go: it would touch \
+         something on the way; choose a posture with room around the tool"
+    )]
+    Unwinding {
+        /// Which joint.
+        joint: String,
+        /// By how many turns.
+        turns: u32,
+    },
     /// None was found.
     #[error("no way free of collision was found between the two postures, in {tries} searches")]
     NoWay {

@@ -26,6 +26,8 @@ pub struct Transit {
     pub from: JointVector,
     /// Where it is to go; continuous joints come there by the shorter way. \[rad\] or \[m\]
     pub to: JointVector,
+    /// Continuous joints are turned back to `to` itself at the end, by whole turns.
+    pub unwinds: bool,
     /// How fast the plan goes along its path.
     pub profile: Profile,
     /// One velocity for all joints; `None`: the robot's limits. \[rad/s\]
@@ -82,18 +84,15 @@ pub fn run(
     }
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
     ends(cell, job)?;
-    if arm.continuous().displacement(&job.from, &job.to).iter().all(|apart| apart.abs() <= SAME) {
+    let is_there =
+        arm.continuous().displacement(&job.from, &job.to).iter().all(|apart| apart.abs() <= SAME);
+    if is_there && !(job.unwinds && job.from.distance(&job.to) > SAME) {
         return Err(TransitError::Arrived);
     }
-    let way = (0..TRIES / AT_ONCE)
-        .find_map(|batch| {
-            let seeds = (batch * AT_ONCE..(batch + 1) * AT_ONCE).into_par_iter();
-            let ways: Vec<_> =
-                seeds.map(|k| jump(cell, &job.from, &job.to, job.seed.wrapping_add(k))).collect();
-            let cost = |way: &Vec<JointVector>| cost::of_path(&cost::Effort, way);
-            ways.into_iter().flatten().min_by(|a, b| cost(a).total_cmp(&cost(b)))
-        })
-        .ok_or(TransitError::NoWay { tries: TRIES })?;
+    let mut way = if is_there { vec![job.from] } else { way(cell, job)? };
+    if job.unwinds {
+        unwind(cell, &mut way, &job.to)?;
+    }
     let mut plan = assemble(robot, cell, &here, job, &way);
     if job.profile.is_curved() {
         let jerk = (job.profile == Profile::Jerk).then(|| timing::jerks(&arm));
@@ -105,6 +104,42 @@ pub fn run(
     let verification = verify(&plan, given, &|| progress.tick())?;
     let clearance = clearance(&plan, &world);
     Ok(TransitOutcome { plan, verification, clearance })
+}
+
+/// The best of the ways that are found first.
+fn way(cell: Workcell<'_>, job: &Transit) -> Result<Vec<JointVector>, TransitError> {
+    (0..TRIES / AT_ONCE)
+        .find_map(|batch| {
+            let seeds = (batch * AT_ONCE..(batch + 1) * AT_ONCE).into_par_iter();
+            let ways: Vec<_> =
+                seeds.map(|k| jump(cell, &job.from, &job.to, job.seed.wrapping_add(k))).collect();
+            let cost = |way: &Vec<JointVector>| cost::of_path(&cost::Effort, way);
+            ways.into_iter().flatten().min_by(|a, b| cost(a).total_cmp(&cost(b)))
+        })
+        .ok_or(TransitError::NoWay { tries: TRIES })
+}
+
+/// Turns one continuous joint after the other, from the tip on, to where it is to be, whole turns and all.
+fn unwind(
+    cell: Workcell<'_>,
+    way: &mut Vec<JointVector>,
+    to: &JointVector,
+) -> Result<(), TransitError> {
+    for j in (0..cell.arm.dof()).rev().filter(|&j| cell.arm.continuous().is(j)) {
+        let Some(&last) = way.last() else { continue };
+        let mut next = last;
+        next[j] = to[j];
+        let turns = ((next[j] - last[j]) / std::f64::consts::TAU).round();
+        if turns == 0.0 {
+            continue;
+        }
+        if !cell.world.motion_free(&last, &next, ToolContact::Forbidden) {
+            let joint = cell.arm.joint_names()[j].clone();
+            return Err(TransitError::Unwinding { joint, turns: turns.abs() as u32 });
+        }
+        way.push(next);
+    }
+    Ok(())
 }
 
 /// The least of arm and hand each, evenly over the joints' motion.
@@ -194,6 +229,7 @@ mod tests {
             stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
             from: arm.home(),
             to,
+            unwinds: false,
             profile: Profile::Velocity,
             v_max: None,
             collision: Options::default(),
@@ -208,5 +244,33 @@ mod tests {
         let plan = go(turned).expect("a way").plan;
         let end = plan.knots.last().expect("knots").q;
         assert!((end[turning] - arm.home()[turning] - 0.5).abs() < 1e-9, "{end:?}");
+    }
+    /// … but where they are to be taken back.
+    #[test]
+    fn whole_turns_are_taken_back_where_that_is_asked_for() {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&ArmSpec::pr2(nullsweep_robot::Side::Right)).expect("an arm");
+        let turning: Vec<usize> = (0..arm.dof()).filter(|&j| arm.continuous().is(j)).collect();
+        let mut from = arm.home();
+        for (j, turns) in turning.iter().zip([2.0, -3.0]) {
+            from[*j] += turns * std::f64::consts::TAU;
+        }
+        let job = Transit {
+            arm: arm.spec().clone(),
+            tool: Tool::default(),
+            stance: Stance { base: [0.0; 3], height: 0.0, held: Vec::new() },
+            from,
+            to: arm.home(),
+            unwinds: true,
+            profile: Profile::Acceleration,
+            v_max: None,
+            collision: Options::default(),
+            seed: 1,
+        };
+        let found = run(&robot, &Scene::empty(), &job, &crate::progress::Silent).expect("a way");
+        let knots = &found.plan.knots;
+        let ends = [(knots[0].q, from), (knots[knots.len() - 1].q, arm.home())];
+        assert!(ends.iter().all(|(found, asked)| found.distance(asked) < 1e-9), "{ends:?}");
+        assert!(found.verification.violations.is_empty());
     }
 }

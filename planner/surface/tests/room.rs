@@ -142,6 +142,14 @@ fn planes_and_objects_are_what_stands_there() {
     let (own, rest) = small.split(&scan);
     assert_eq!(own.len(), small.points);
     assert_eq!(own.len() + rest.len(), scan.len());
+    // What a mesh knows beside its points goes with the thing that it is of.
+    let mut mesh = scan.clone();
+    mesh.views[0].faces = mesh.views[0].points.iter().map(|p| p + Vector3::z() * 1e-4).collect();
+    mesh.views[0].inside = large.split(&scan).0.views[0].points.clone();
+    let (own, rest) = small.split(&mesh);
+    let counts = |part: &PlacedScan| [part.views[0].faces.len(), part.views[0].inside.len()];
+    assert_eq!(counts(&own), [small.points, 0]);
+    assert_eq!(counts(&rest), [scan.len() - small.points, large.points]);
     assert_eq!(Room::find(&scan, 1), room, "the same seed finds the same room");
 }
 

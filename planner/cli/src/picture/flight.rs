@@ -24,6 +24,8 @@ pub(crate) struct Flight {
     pub(super) measured: Motion,
     /// The first of the given plans that ran in it; 0 without any.
     pub(super) first: usize,
+    /// Those of the given plans that ran in it, and when. \[s\]
+    begun: Vec<(usize, f64)>,
     /// How many plans ran.
     pub(super) ran: usize,
     /// Measured positions, close enough to say what they sweep.
@@ -123,12 +125,18 @@ impl Flight {
             "the recording has no state of the arm while the plan ran"
         );
         let swept = thinned(&states, |s| s.time, STEP.1, |_| false).iter().map(|s| s.q).collect();
-        let Span { first, ran, .. } = span;
-        Ok(Self { commanded, measured, first, ran, swept, joint, pad: off })
+        let Span { first, ran, begun, .. } = span;
+        Ok(Self { commanded, measured, first, begun, ran, swept, joint, pad: off })
     }
 }
 
 impl Flight {
+    /// When a plan's time was 0, from the start of the first plan that ran. \[s\]
+    pub(super) fn began(&self, plan: usize) -> Option<(usize, f64)> {
+        let found = self.begun.iter().find(|(index, _)| *index == plan)?;
+        Some((self.first, found.1))
+    }
+
     /// What was measured, on the clock of the plans' motions.
     pub(super) fn after(&self, plans: &[Motion]) -> Motion {
         let starts_at = plans.get(self.first).map_or(0.0, |plan| plan.starts_at);
@@ -141,6 +149,7 @@ struct Span {
     from_ns: u64,
     to_ns: u64,
     first: usize,
+    begun: Vec<(usize, f64)>,
     ran: usize,
 }
 
@@ -166,7 +175,7 @@ impl Span {
         };
         if plans.is_empty() {
             let (from_ns, to_ns) = cycles(&ran);
-            return Ok(Self { from_ns, to_ns, first: 0, ran: ran.len() });
+            return Ok(Self { from_ns, to_ns, first: 0, begun: Vec::new(), ran: ran.len() });
         }
         // From the last plan on backwards: each as it ran last before the one that came after it.
         let mut found: Vec<(usize, &RecordedPlan)> = Vec::new();
@@ -190,8 +199,11 @@ impl Span {
             bail!("none of the plans given ran in the recording; {others}");
         };
         let ids: Vec<PlanId> = found.iter().map(|(_, recorded)| recorded.id).collect();
-        let (begun, to_ns) = cycles(&ids);
-        Ok(Self { from_ns: start(recording, begin).unwrap_or(begun), to_ns, first, ran: ids.len() })
+        let (_, to_ns) = cycles(&ids);
+        let began = |plan: &RecordedPlan| start(recording, plan).unwrap_or(cycles(&[plan.id]).0);
+        let from_ns = began(begin);
+        let begun = found.iter().map(|(i, plan)| (*i, seconds(began(plan), from_ns))).collect();
+        Ok(Self { from_ns, to_ns, first, begun, ran: ids.len() })
     }
 
     fn holds(&self, cycle: &CycleRecord) -> bool {

@@ -1,5 +1,7 @@
 //! Plans as motions over time.
 
+use std::borrow::Cow;
+
 use nalgebra::Isometry3;
 use nullsweep_collision::Exact;
 use nullsweep_planner::plan::{Plan, Profile};
@@ -18,16 +20,20 @@ pub(super) const REACH: f64 = 0.1;
 /// At how many times the page's own kinematics is compared with ours.
 const PROBES: usize = 60;
 
-/// Each plan where it takes over from the one before.
+/// Each plan where it takes over from the one before: as it was recorded, else as it was planned. One that
+/// was stopped ends where the next one says that it was left.
 pub(super) fn motions(sitter: &Sitter<'_>, here: Option<&Scene>) -> anyhow::Result<Vec<Motion>> {
     let Sitter { plans, robot, arm, collision, .. } = sitter;
     let mut motions: Vec<Motion> = Vec::new();
     for (i, plan) in plans.iter().enumerate() {
-        let starts_at = match i.checked_sub(1) {
-            None => 0.0,
-            Some(before) => motions[before].starts_at + taken_over(&plans[before], plan),
+        let recorded = sitter.flights.iter().find_map(|flight| flight.began(i));
+        let starts_at = match (i.checked_sub(1), recorded) {
+            (None, _) => 0.0,
+            (_, Some((first, after))) if first < i => motions[first].starts_at + after,
+            (Some(before), _) => motions[before].starts_at + taken_over(&plans[before], plan),
         };
-        let mut motion = motion(plan, arm);
+        let left = plans.get(i + 1).and_then(|next| left_at(plan, next));
+        let mut motion = motion(&until(plan, left), arm);
         motion.name = if plans.len() > 1 { format!("plan {}", i + 1) } else { "plan".into() };
         motion.starts_at = starts_at;
         if let Some(scene) = here {
@@ -41,13 +47,29 @@ pub(super) fn motions(sitter: &Sitter<'_>, here: Option<&Scene>) -> anyhow::Resu
     Ok(motions)
 }
 
-/// When a plan takes over from another one: in the knot that it goes on from, else at the other's
-/// end. \[s\]
+/// When a plan takes over from another one: in the knot that it goes on from, else in the last one before
+/// the other was stopped, else at the other's end. \[s\]
 fn taken_over(before: &Plan, plan: &Plan) -> f64 {
     let digest = before.digest().ok();
     let knot = plan.continues.as_ref().filter(|c| digest == Some(c.digest));
-    let knot = knot.and_then(|c| before.knots.get(c.knot as usize));
+    let knot = knot.map(|c| c.knot as usize).or_else(|| left_at(before, plan));
+    let knot = knot.and_then(|knot| before.knots.get(knot));
     knot.map_or(before.duration(), |knot| knot.time_ns as f64 * 1e-9)
+}
+
+/// The last knot of a plan that was passed before it was stopped, where the next one was made for what it
+/// has left.
+fn left_at(before: &Plan, next: &Plan) -> Option<usize> {
+    let followed = next.past.last().filter(|_| next.continues.is_none())?;
+    before.knots.starts_with(&followed.knots).then(|| followed.knots.len() - 1)
+}
+
+/// A plan up to a knot, if one is given.
+fn until(plan: &Plan, knot: Option<usize>) -> Cow<'_, Plan> {
+    let Some(knot) = knot else { return Cow::Borrowed(plan) };
+    let mut part = plan.clone();
+    part.knots.truncate(knot + 1);
+    Cow::Owned(part)
 }
 
 /// A plan from its own start on.

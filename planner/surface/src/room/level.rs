@@ -55,7 +55,7 @@ pub fn level(raw: &RawScan, up: Option<UnitVector3<f64>>, seed: u64) -> Result<L
     // The points of a scanner that stood elsewhere are in no camera's frame.
     let elsewhere = raw.sensor.is_some_and(|at| at != Point3::origin());
     let view = field_of_view(&raw.points).filter(|_| !elsewhere);
-    let camera = view.is_some() && raw.sensor.is_some();
+    let camera = held(raw).is_some();
     let noise = Noise { sensors: camera.then(Point3::origin).into_iter().collect() };
     let (thin, side) = flat::thin(&raw.points);
     let flats = flat::find(&thin, side, &noise, seed);
@@ -112,6 +112,13 @@ pub fn lean(raw: &RawScan, up: &UnitVector3<f64>, seed: u64) -> Option<Lean> {
     let above = raw.sensor.map_or(up.into_inner(), |sensor| sensor - flat.centroid);
     let up_by_it = if flat.normal.dot(&above) < 0.0 { -flat.normal } else { flat.normal };
     Some(Lean { angle: level(flat).min(1.0).acos(), area: flat.area, up: up_by_it })
+}
+
+/// The direction up of the camera at the file's origin that has seen a scan, were it held level; `None`
+/// where the points stand in no camera's frame.
+#[must_use]
+pub fn held(raw: &RawScan) -> Option<UnitVector3<f64>> {
+    field_of_view(&raw.points).filter(|_| raw.sensor == Some(Point3::origin()))
 }
 
 /// The direction up of a camera that is held level, if all points lie in the field of view of one at

@@ -15,7 +15,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::scan::PlacedScan;
 use flat::{Flat, Noise};
-pub use level::{Lean, Level, LevelError, lean, level};
+pub use level::{Lean, Level, LevelError, held, lean, level};
 pub use outline::Rectangle;
 pub use plane::{Plane, PlaneKind};
 pub use segment::Segment;

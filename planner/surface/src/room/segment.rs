@@ -8,6 +8,7 @@ use nalgebra::{Point3, Vector3};
 use super::flat::Noise;
 use super::outline;
 use super::plane::{Plane, PlaneKind};
+use crate::grid::Grid;
 use crate::scan::{CropBox, PlacedScan, View};
 
 /// An object: points that hang together and stand on floor or table.
@@ -40,6 +41,12 @@ const ASIDE: f64 = 0.08;
 /// stands on it.
 const BAND: f64 = 1.5;
 
+/// What a mesh knows beside its points is of the thing that its nearest point is of, which is about
+/// this near … \[m\]
+const NEXT_TO: f64 = 0.02;
+/// … and is looked for as far as this. \[m\]
+const BESIDE: f64 = 1.0;
+
 impl Segment {
     /// The object's own views, and those of all else.
     #[must_use]
@@ -49,10 +56,15 @@ impl Segment {
                 let mut member = vec![false; view.points.len()];
                 members.iter().for_each(|&i| member[i as usize] = true);
                 let kept: Vec<usize> = (0..member.len()).filter(|&i| member[i] == keep).collect();
+                let all = Grid::new(&view.points, NEXT_TO);
+                let nearest = |p: &Point3<f64>| all.nearest(p, BESIDE, |_| true);
+                let ours =
+                    |p: &Point3<f64>| nearest(p).is_some_and(|(i, _)| member[i as usize]) == keep;
                 View {
                     points: kept.iter().map(|&i| view.points[i]).collect(),
                     normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
-                    inside: Vec::new(),
+                    faces: view.faces.iter().copied().filter(ours).collect(),
+                    inside: view.inside.iter().copied().filter(ours).collect(),
                     sensor: view.sensor,
                 }
             };

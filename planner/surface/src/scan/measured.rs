@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::cloud::Scan;
-use super::place::PlacedScan;
+use super::place::{PlacedScan, View};
 use crate::grid::Grid;
 
 /// A point this near to a point of the surface is the surface, seen with the sensor's noise. \[m\]
@@ -31,12 +31,11 @@ pub struct Measured {
 /// Sorts every point of the views by whether the surface made of them stands for it.
 #[must_use]
 pub fn measured(scan: &PlacedScan, surface: &Scan) -> Measured {
-    let all: Vec<Point3<f64>> =
-        scan.views.iter().flat_map(|view| view.points.iter().copied()).collect();
+    let all: Vec<Point3<f64>> = scan.views.iter().flat_map(found).copied().collect();
     let of_camera: Vec<bool> = scan
         .views
         .iter()
-        .flat_map(|view| std::iter::repeat_n(view.sensor.is_some(), view.points.len()))
+        .flat_map(|view| std::iter::repeat_n(view.sensor.is_some(), found(view).len()))
         .collect();
     let near = NEAR.max(4.0 * surface.spacing);
     let known = Grid::new(&surface.points, STANDS_FOR);
@@ -67,6 +66,11 @@ pub fn measured(scan: &PlacedScan, surface: &Scan) -> Measured {
         kind.push(point);
     }
     measured
+}
+
+/// What a view knows of things: its points, or its meshes' faces.
+fn found(view: &View) -> &[Point3<f64>] {
+    if view.faces.is_empty() { &view.points } else { &view.faces }
 }
 
 #[cfg(test)]

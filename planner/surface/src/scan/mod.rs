@@ -16,6 +16,7 @@ mod crop;
 mod decode;
 mod e57;
 mod error;
+mod faces;
 mod foreign;
 mod gltf;
 mod guarded;

@@ -54,6 +54,9 @@ pub struct View {
     pub points: Vec<Point3<f64>>,
     /// Normals that the file gave, parallel to `points`.
     pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// The corners of its meshes and places all over their faces: what is in the way where `points`
+    /// are but drawn at random. Empty for points. \[m\]
+    pub faces: Vec<Point3<f64>>,
     /// Places inside what its closed meshes enclose. \[m\]
     pub inside: Vec<Point3<f64>>,
     /// Where the sensor stood; `None`: unknown. \[m\]
@@ -103,6 +106,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
             .normals
             .as_ref()
             .map(|normals| normals.iter().map(|n| pose.rotation * n).collect()),
+        faces: raw.faces.iter().map(|p| pose * p).collect(),
         inside: raw.inside.iter().map(|p| pose * p).collect(),
         sensor,
     };
@@ -164,10 +168,12 @@ impl PlacedScan {
 fn crop(view: &View, region: &CropBox) -> View {
     let kept: Vec<usize> =
         (0..view.points.len()).filter(|&i| region.contains(&view.points[i])).collect();
+    let within = |all: &[Point3<f64>]| all.iter().copied().filter(|p| region.contains(p)).collect();
     View {
         points: kept.iter().map(|&i| view.points[i]).collect(),
         normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
-        inside: view.inside.iter().copied().filter(|p| region.contains(p)).collect(),
+        faces: within(&view.faces),
+        inside: within(&view.inside),
         sensor: view.sensor,
     }
 }

@@ -13,6 +13,8 @@ pub struct RawScan {
     pub vertices: Vec<Point3<f64>>,
     /// Unit normals parallel to `points`, where the file has a usable one for every point.
     pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// A mesh's corners and places all over its faces; empty for points. \[m\]
+    pub faces: Vec<Point3<f64>>,
     /// Places inside what closed meshes enclose, on a grid. \[m\]
     pub inside: Vec<Point3<f64>>,
     /// Pose of the sensor in the frame of the points, where a PCD header states other than the
@@ -38,6 +40,7 @@ impl Default for RawScan {
             points: Vec::new(),
             vertices: Vec::new(),
             normals: None,
+            faces: Vec::new(),
             inside: Vec::new(),
             viewpoint: None,
             sensor: Some(Point3::origin()),

@@ -10,7 +10,8 @@ use super::parsed::Parsed;
 use super::raw::RawScan;
 use super::warning::ScanWarning;
 use super::{
-    decode, e57, foreign, gltf, inside, las, mesh, npy, pcd, ply, ptx, sample, stray, text, winding,
+    decode, e57, faces, foreign, gltf, inside, las, mesh, npy, pcd, ply, ptx, sample, stray, text,
+    winding,
 };
 
 /// How to read a scan.
@@ -159,7 +160,8 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     if let Some(at) = &mut sensor {
         at.coords *= scale;
     }
-    let (mut dropped, mut inside, mut vertices) = (0, Vec::new(), Vec::new());
+    let (mut dropped, mut inside) = (0, Vec::new());
+    let (mut vertices, mut on_faces) = (Vec::new(), Vec::new());
     if !triangles.is_empty() {
         sensor = None;
         unused(points.len(), &triangles, &mut warnings);
@@ -169,6 +171,7 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
         let mut used = vec![false; points.len()];
         corners.for_each(|&corner| used[corner] = true);
         vertices = points;
+        on_faces = faces::places(&vertices, &wound, options.mesh_spacing);
         (points, normals, dropped) =
             sample::sample(&vertices, &wound, options.mesh_spacing, options.seed, &mut warnings);
         let mut used = used.into_iter();
@@ -215,7 +218,17 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     let normals = (normals.len() == points.len())
         .then(|| normals.into_iter().map(unit).collect::<Option<Vec<_>>>())
         .flatten();
-    Ok(RawScan { points, vertices, normals, inside, viewpoint, sensor, dropped, warnings })
+    Ok(RawScan {
+        points,
+        vertices,
+        normals,
+        faces: on_faces,
+        inside,
+        viewpoint,
+        sensor,
+        dropped,
+        warnings,
+    })
 }
 
 /// Tells of a mesh's vertices that are in none of its faces, as points and lines beside them are.
