@@ -57,12 +57,12 @@ pub(super) struct ViewArgs {
 
 pub(super) fn run(args: &ViewArgs) -> anyhow::Result<u8> {
     let bars = Bars::new();
-    if let Some(absent) = args.files.iter().find(|file| !file.exists()) {
-        return Err(Usage(format!("{}: there is no such file", absent.display())).into());
-    }
     let out = args.out.clone().unwrap_or_else(|| beside(args.files.first()));
     writable(&out)?;
     args.mcap.as_deref().map_or(Ok(()), writable)?;
+    if let Some(absent) = args.files.iter().find(|file| !file.exists()) {
+        return Err(Usage(format!("{}: there is no such file", absent.display())).into());
+    }
     let (plans, rest): (Vec<&PathBuf>, Vec<&PathBuf>) =
         args.files.iter().partition(|file| is_plan(file));
     let (recordings, scans): (Vec<&PathBuf>, Vec<&PathBuf>) =

@@ -88,6 +88,25 @@ fn an_output_that_cannot_be_written_is_told_before_the_work() {
 }
 
 #[test]
+fn a_cell_keeps_the_root_path_that_it_was_made_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (code, _, said) = run(folder.path(), "cell init --robot-name a --ipc-root worlds/a");
+    assert_eq!(code, Some(0), "{said}");
+    let cell = std::fs::read_to_string(folder.path().join("cell.toml")).expect("a cell");
+    let root = folder.path().canonicalize().expect("there").join("worlds/a");
+    assert!(cell.contains(&format!("\nipc_root = {root:?}\n")), "{cell}");
+}
+
+#[test]
+fn a_file_to_be_viewed_that_is_not_there_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("flight-0.nswrec"), "").expect("written");
+    let (code, _, said) = run(folder.path(), "view flight-0.nswrec chair.jsn --no-open");
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("chair.jsn: there is no such file"), "{said}");
+}
+
+#[test]
 fn a_note_is_told_once() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("cell.toml"), "[scene]\nsupport_height = 0.7\n")
