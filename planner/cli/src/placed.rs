@@ -132,7 +132,7 @@ pub(super) fn read_scans(
         joined.join(placed);
         sources.push(Source { file: path.clone(), scale: args.scale, pose });
     }
-    Ok(Placed { scan: joined, sources, seed: None })
+    Ok(Placed { scan: joined, sources, regions: None, seed: None })
 }
 
 /// Tells that a file does not say where its sensor stood, though an argument speaks of it.

@@ -106,6 +106,7 @@ fn kind(cause: &Cause) -> String {
         }
         Cause::Object { .. } => "from nowhere: the robot would meet the object",
         Cause::Unseen { .. } => "from nowhere: the robot would be in unseen space",
+        Cause::KeepOut => "from nowhere: the pad would touch what it is to keep out of",
         Cause::Press => "from nowhere: the pad would be pressed in too deep",
         Cause::NoMotion | Cause::Passed | Cause::Uneven | Cause::Missed => {
             "from nowhere that was looked at"

@@ -54,6 +54,8 @@ pub struct View {
     pub points: Vec<Point3<f64>>,
     /// Normals that the file gave, parallel to `points`.
     pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// Red, green and blue that the file gave, parallel to `points`.
+    pub colours: Option<Vec<[u8; 3]>>,
     /// Places inside what its closed meshes enclose. \[m\]
     pub inside: Vec<Point3<f64>>,
     /// Where the sensor stood; `None`: unknown. \[m\]
@@ -103,6 +105,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
             .normals
             .as_ref()
             .map(|normals| normals.iter().map(|n| pose.rotation * n).collect()),
+        colours: raw.colours.clone(),
         inside: raw.inside.iter().map(|p| pose * p).collect(),
         sensor,
     };
@@ -167,6 +170,7 @@ fn crop(view: &View, region: &CropBox) -> View {
     View {
         points: kept.iter().map(|&i| view.points[i]).collect(),
         normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
+        colours: view.colours.as_ref().map(|c| kept.iter().map(|&i| c[i]).collect()),
         inside: view.inside.iter().copied().filter(|p| region.contains(p)).collect(),
         sensor: view.sensor,
     }

@@ -13,6 +13,8 @@ pub struct RawScan {
     pub vertices: Vec<Point3<f64>>,
     /// Unit normals parallel to `points`, where the file has a usable one for every point.
     pub normals: Option<Vec<UnitVector3<f64>>>,
+    /// Red, green and blue parallel to `points`, where the file has them.
+    pub colours: Option<Vec<[u8; 3]>>,
     /// Places inside what closed meshes enclose, on a grid. \[m\]
     pub inside: Vec<Point3<f64>>,
     /// Pose of the sensor in the frame of the points, where a PCD header states other than the
@@ -38,6 +40,7 @@ impl Default for RawScan {
             points: Vec::new(),
             vertices: Vec::new(),
             normals: None,
+            colours: None,
             inside: Vec::new(),
             viewpoint: None,
             sensor: Some(Point3::origin()),
