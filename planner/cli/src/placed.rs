@@ -30,7 +30,7 @@ pub(super) struct PlacedArgs {
     up: Option<Numbers<3>>,
     /// Take several scans as they are placed, without laying each onto those before it.
     #[arg(long)]
-    as_placed: bool,
+    pub(super) as_placed: bool,
     /// Height of the sensor above what the object stands on. [m]
     #[arg(long, value_name = "M", requires = "up", value_parser = finite)]
     sensor_height: Option<f64>,

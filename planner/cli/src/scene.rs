@@ -111,6 +111,17 @@ pub(super) fn scene(
     seed: u64,
     bars: &Bars,
 ) -> anyhow::Result<Scene> {
+    Ok(seen(args, demo, scans, seed, bars)?.0)
+}
+
+/// The same with the scans as they were read.
+pub(super) fn seen(
+    args: &SceneArgs,
+    demo: Option<Demo>,
+    scans: &[PathBuf],
+    seed: u64,
+    bars: &Bars,
+) -> anyhow::Result<(Scene, Placed)> {
     let (placed, (mut scene, flying)) = if let Some(choice) = args.object {
         ensure!(demo.is_none(), "--object chooses from a scan, not from a demo");
         let placed = read_scans(&args.placed, scans, seed, Gravity::Found, bars)?;
@@ -156,7 +167,9 @@ pub(super) fn scene(
         scan_to_floor: placed.sources.first().map_or_else(Isometry3::identity, |first| first.pose),
         seed: placed.seed.unwrap_or(room::SEED),
     };
-    with_regions(scene, args.regions.as_deref().or(placed.regions.as_deref()), &around)
+    let regions = args.regions.as_deref().or(placed.regions.as_deref());
+    let scene = with_regions(scene, regions, &around)?;
+    Ok((scene, placed))
 }
 
 /// The scene with the regions of a file, if there is one.

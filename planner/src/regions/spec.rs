@@ -346,3 +346,6 @@ fn pose(what: &str, at: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Result<Isomet
     let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
     Ok(Isometry3::from_parts(Translation3::from(at), rotation))
 }
+
+#[cfg(test)]
+mod tests;

@@ -174,8 +174,10 @@ const COLLISION: &[&str] = &[
     "exact", "clearance", "fixed", "moving", "motion", "never", "world", "check", "proof",
 ];
 
-const SURFACE: &[&str] =
-    &["grid", "thin", "fit", "scan", "simulate", "room", "register", "sheet", "patches", "unseen"];
+const SURFACE: &[&str] = &[
+    "grid", "thin", "fit", "scan", "simulate", "change", "room", "register", "sheet", "patches",
+    "unseen",
+];
 
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[
