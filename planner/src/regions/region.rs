@@ -225,19 +225,25 @@ impl Regions {
     /// What is swept in which order: of greater priority first, at one speed together, pass after pass.
     #[must_use]
     pub fn rounds(&self) -> Vec<Round> {
-        let mut groups: Vec<(i32, Option<f64>, Vec<(usize, u32)>)> = Vec::new();
-        for (region, Sweep { passes, tool_speed, priority }) in self.sweeps() {
-            match groups.iter_mut().find(|g| g.0 == priority && g.1 == tool_speed) {
-                Some((_, _, of)) => of.push((region, passes)),
-                None => groups.push((priority, tool_speed, vec![(region, passes)])),
+        // What is alike, with the most passes over any of it.
+        let mut groups: Vec<(Sweep, Vec<usize>)> = Vec::new();
+        for (region, sweep) in self.sweeps() {
+            let is_alike =
+                |of: &Sweep| of.priority == sweep.priority && of.tool_speed == sweep.tool_speed;
+            match groups.iter_mut().find(|(of, _)| is_alike(of)) {
+                Some((of, regions)) => {
+                    of.passes = of.passes.max(sweep.passes);
+                    regions.push(region);
+                }
+                None => groups.push((sweep, vec![region])),
             }
         }
-        groups.sort_by_key(|(priority, _, _)| std::cmp::Reverse(*priority));
+        groups.sort_by_key(|(of, _)| std::cmp::Reverse(of.priority));
         let mut rounds = Vec::new();
-        for (_, tool_speed, of) in groups {
-            for pass in 1..=of.iter().map(|(_, passes)| *passes).max().unwrap_or(0) {
-                let due = of.iter().filter(|(_, passes)| *passes >= pass);
-                let regions = due.map(|(region, _)| *region).collect();
+        for (Sweep { passes, tool_speed, .. }, of) in groups {
+            for pass in 1..=passes {
+                let is_due = |region: &usize| self.passes(Label::Sweep(*region)) >= pass;
+                let regions = of.iter().copied().filter(is_due).collect();
                 rounds.push(Round { regions, pass, tool_speed });
             }
         }
