@@ -129,14 +129,15 @@ mod tests {
         let before = plate(Some([180, 180, 180]), 0.0, false);
         let surface = surface(&before);
         let of = |after: &PlacedScan| changes(&surface, &before, after);
-        let far = |i: &usize| surface.points[*i].x.abs() > 0.02;
+        // Away from the border, left and right of it.
         let sides = |changes: &[Change]| {
-            let some: Vec<usize> = (0..changes.len()).filter(far).collect();
-            let of = |right: bool| {
-                let own = some.iter().filter(move |&&i| (surface.points[i].x > 0.0) == right);
-                own.map(|&i| changes[i]).collect::<Vec<Change>>()
-            };
-            [of(false), of(true)]
+            let mut sides = [Vec::new(), Vec::new()];
+            for (point, change) in surface.points.iter().zip(changes) {
+                if point.x.abs() > 0.02 {
+                    sides[usize::from(point.x > 0.0)].push(*change);
+                }
+            }
+            sides
         };
         let [left, right] = sides(&of(&plate(Some([100, 180, 240]), 0.0, false)));
         assert!(left.iter().all(|c| c.colour == Some(0.0) && c.height == Some(0.0)));
