@@ -24,6 +24,7 @@
 
 pub mod cost;
 pub mod progress;
+pub mod regions;
 
 pub mod workcell;
 

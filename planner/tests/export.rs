@@ -29,6 +29,7 @@ fn plan(profile: Profile) -> Plan {
         knots: vec![knot(0, 0.25, 0.0), knot(1_000_000_005, 0.5, 0.125)],
         patches: Vec::new(),
         surface: Vec::new(),
+        regions: Vec::new(),
         continues: None,
         past: Vec::new(),
         left: Vec::new(),

@@ -73,6 +73,7 @@ mod tests {
             knots: Vec::new(),
             patches: Vec::new(),
             surface,
+            regions: Vec::new(),
             continues: None,
             past: Vec::new(),
             left: Vec::new(),

@@ -48,6 +48,7 @@ fn plan(profile: Profile, knots: &[((JointVector, JointVector), u64)]) -> Plan {
         knots: knots.collect(),
         patches: Vec::new(),
         surface: Vec::new(),
+        regions: Vec::new(),
         continues: None,
         past: Vec::new(),
         left: Vec::new(),

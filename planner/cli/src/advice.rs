@@ -12,8 +12,10 @@ use nullsweep_planner::link::replan::ReplanError;
 use nullsweep_planner::pipeline::PipelineError;
 use nullsweep_planner::plan::PlanError;
 use nullsweep_planner::poses::SetupError;
+use nullsweep_planner::regions::RegionError;
 use nullsweep_planner::task::TaskError;
 use nullsweep_planner::transit::{Place, TransitError};
+use nullsweep_planner::verify::VerifyError;
 use nullsweep_surface::ScanError;
 use nullsweep_surface::register::RegisterError;
 use nullsweep_surface::room::LevelError;
@@ -55,6 +57,14 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         transit(error)
     } else if let Some(error) = error.downcast_ref() {
         posture(error)
+    } else if let Some(VerifyError::OtherRegions { .. }) = error.downcast_ref() {
+        Some("give --regions as it was given to `plan`".into())
+    } else if let Some(RegionError::Nothing { .. }) = error.downcast_ref() {
+        Some(
+            "its shapes are in the floor frame, which `planner scene` shows, or by frame = \"scan\" in \
+             the first scan file's own"
+                .into(),
+        )
     } else if let Some(LevelError::NoPlane { .. }) = error.downcast_ref() {
         Some(
             "say how the scan stands: --up X,Y,Z (against gravity, in the file's frame) with \

@@ -2,6 +2,7 @@
 
 use comfy_table::Table;
 use nullsweep_planner::pipeline::Figures;
+use nullsweep_planner::regions::{Kind, RegionFigures};
 use nullsweep_planner::sweep::{self, JointPace, Pace};
 use nullsweep_planner::verify::{Against, Verification};
 use nullsweep_planner::workcell::stance::told;
@@ -33,11 +34,30 @@ pub(super) fn verified_rows(v: &Verification) -> Vec<[String; 2]> {
         ("violations", found),
         ("  against", against),
     ];
+    let regions = v.regions.iter().map(region_row);
     // Without a surface nothing is known of what is swept, pressed and faced.
     let of_surface =
         |name: &str| !["line deviation, max", "violations", "  against"].contains(&name);
     let known = rows.into_iter().filter(|(name, _)| a.surface_points > 0 || !of_surface(name));
-    known.map(|(name, value)| [name.to_owned(), value]).collect()
+    known.map(|(name, value)| [name.to_owned(), value]).chain(regions).collect()
+}
+
+/// What came of a region, for people.
+fn region_row(r: &RegionFigures) -> [String; 2] {
+    let points = r.points;
+    let value = match r.kind {
+        Kind::Avoid => "avoided".into(),
+        Kind::KeepOut => format!("kept out of: {} of {points} points touched", percent(r.coverage)),
+        Kind::Sweep(sweep) => {
+            let times = match sweep.passes {
+                1 => String::new(),
+                passes => format!(" passed over {passes} times or more"),
+            };
+            let (all, reachable) = (percent(r.coverage), percent(r.coverage_reachable));
+            format!("{all} of {points} points, {reachable} of the reachable{times}")
+        }
+    };
+    [format!("region {}", r.name), value]
 }
 
 /// The same for a page.
@@ -56,8 +76,12 @@ pub(super) fn held_against(a: &Against) -> String {
         n => format!("{n} of unseen space"),
     };
     let obstacles = if a.obstacles == 1 { "obstacle" } else { "obstacles" };
+    let keep_out = match a.keep_out_points {
+        0 => String::new(),
+        n => format!(", {n} points to keep out of"),
+    };
     format!(
-        "{} points of the surface, {} others, {} raw, {unseen}, {} {obstacles}{}",
+        "{} points of the surface, {} others, {} raw, {unseen}, {} {obstacles}{keep_out}{}",
         a.surface_points,
         a.other_points,
         a.raw_points,
@@ -108,6 +132,22 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     let passes = format!("{:.0}, {:.0}", f.passes.passes_p50, f.passes.passes_p95);
     row("passes over a point, p50, p95", passes);
+    let histogram = f.passes.passes_histogram.map(|points| points.to_string());
+    row("points by passes, 0, 1 … 8 or more", histogram.join(", "));
+    for round in &f.rounds {
+        let regions = match &round.regions[..] {
+            [] => "all".into(),
+            some => some.join(", "),
+        };
+        row(
+            &format!("round: {regions}, pass {}", round.pass),
+            format!("{:.2} s", round.task_time_s),
+        );
+        if let Some(held) = &round.tool_speed {
+            let share = percent(held.share);
+            row("  tool speed held", format!("{} m/s over {share} of the length", held.speed));
+        }
+    }
     row("jumps", f.jumps.to_string());
     row("dropped patches", f.dropped_patches.to_string());
     row("knots", f.knots.to_string());

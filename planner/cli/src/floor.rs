@@ -19,6 +19,8 @@ pub(super) struct Placed {
     pub(super) scan: PlacedScan,
     /// The file of each view.
     pub(super) sources: Vec<Source>,
+    /// The file of regions that a scene file names.
+    pub(super) regions: Option<PathBuf>,
     /// By which a scene file's planes and objects were found.
     pub(super) seed: Option<u64>,
 }

@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::bars::Bars;
 use crate::choices::ProfileArg;
-use crate::exit::OK;
+use crate::exit::{OK, Usage};
 use crate::jerk::JerkArg;
 use crate::json::write_json;
 use crate::numbers::{Held, Offset, Place, finite, positive, velocity};
@@ -184,7 +184,16 @@ impl GivenArgs {
     fn scene(&self, poses: &[Isometry3<f64>], tool: &Tool, bars: &Bars) -> anyhow::Result<Scene> {
         if !self.scans.is_empty() {
             bars.stage("scan", None);
-            return Ok(scene(&self.around, None, &self.scans, self.seed, bars)?.in_the_way());
+            let scene = scene(&self.around, None, &self.scans, self.seed, bars)?;
+            if scene.regions.are_swept() {
+                return Err(Usage(
+                    "regions to sweep are of `plan`: given poses say themselves where the tool goes; \
+                     leave such regions out of --regions"
+                        .into(),
+                )
+                .into());
+            }
+            return Ok(scene.in_the_way());
         }
         let floor = self.floor.unwrap_or_else(|| {
             let margin = self.robot.collision().margins.environment;
@@ -195,9 +204,7 @@ impl GivenArgs {
             floor
         });
         let floor = Obstacle::floor(Isometry3::translation(0.0, 0.0, floor));
-        let mut obstacles = vec![floor];
-        obstacles.extend(self.around.obstacles()?);
-        Ok(Scene::of_obstacles(obstacles))
+        self.around.unscanned(floor)
     }
 }
 

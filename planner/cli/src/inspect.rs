@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use nullsweep_planner::cost::{Effort, of_path};
 use nullsweep_planner::plan::{Plan, Program};
-use nullsweep_planner::sweep::{DIP, Pace, Passes, passes};
+use nullsweep_planner::sweep::{DIP, Pace, Passes, passes_over};
 use nullsweep_planner::workcell::stance::told;
 use nullsweep_robot::MAX_DOF;
 use serde::Serialize;
@@ -122,7 +122,8 @@ fn paced(args: &InspectArgs, plan: &Plan) -> anyhow::Result<Option<(Pace, Passes
     let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
     let arm = arm.with_held(&held)?;
     let pace = Pace::of(plan.trajectory(), plan.begins_in_motion(), &arm, args.dip);
-    Ok(Some((pace, passes(&plan.scan(), plan.trajectory(), &arm))))
+    let passes = Passes::of(&passes_over(&plan.scan(), [plan.trajectory()], &arm));
+    Ok(Some((pace, passes)))
 }
 
 fn summarise(plan: &Plan) -> Summary {

@@ -1,6 +1,7 @@
 //! The command line of `planner`.
 
 mod advice;
+mod again;
 mod bars;
 pub mod calls;
 mod cell;

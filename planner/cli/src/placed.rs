@@ -30,7 +30,7 @@ pub(super) struct PlacedArgs {
     up: Option<Numbers<3>>,
     /// Take several scans as they are placed, without laying each onto those before it.
     #[arg(long)]
-    as_placed: bool,
+    pub(super) as_placed: bool,
     /// Height of the sensor above what the object stands on. [m]
     #[arg(long, value_name = "M", requires = "up", value_parser = finite)]
     sensor_height: Option<f64>,
@@ -132,7 +132,7 @@ pub(super) fn read_scans(
         joined.join(placed);
         sources.push(Source { file: path.clone(), scale: args.scale, pose });
     }
-    Ok(Placed { scan: joined, sources, seed: None })
+    Ok(Placed { scan: joined, sources, regions: None, seed: None })
 }
 
 /// Tells that a file does not say where its sensor stood, though an argument speaks of it.

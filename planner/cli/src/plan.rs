@@ -22,6 +22,7 @@ use crate::bars::Bars;
 use crate::choices::{CostArg, MethodArg, ProfileArg, SmoothArg};
 use crate::exit::OK;
 use crate::figures::{figures_table, table};
+use crate::floor::Placed;
 use crate::jerk::JerkArg;
 use crate::json::write_json;
 use crate::numbers::{Held, Place, finite, not_negative, positive, velocity};
@@ -30,7 +31,7 @@ use crate::picture::{Sitter, picture};
 use crate::posture_arg::PostureArg;
 use crate::refusal::write_unless_broken;
 use crate::robot::{RobotArgs, tool_file};
-use crate::scene::{Demo, SceneArgs, scene};
+use crate::scene::{Demo, SceneArgs, seen};
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -42,7 +43,7 @@ pub(super) struct PlanArgs {
     demo: Option<Demo>,
 
     #[command(flatten)]
-    scene: SceneArgs,
+    pub(super) scene: SceneArgs,
 
     #[command(flatten)]
     pub(super) robot: RobotArgs,
@@ -200,9 +201,7 @@ pub(super) fn make(
     site: Site<'_>,
     after: Option<After>,
 ) -> anyhow::Result<(u8, Plan)> {
-    for out in [Some(&args.out), args.json.as_ref(), args.report.as_ref()].into_iter().flatten() {
-        writable(out)?;
-    }
+    args.writable()?;
     let made = args.work(site, after, &Bars::new())?;
     Ok((finish(args, &made)?, made.outcome.plan))
 }
@@ -235,6 +234,17 @@ impl PlanArgs {
         self.robot.tell(&robot, bars)?;
         let job = job(self, &robot, site, after, bars)?;
         let scene = self.scene(bars)?;
+        self.planned(robot, scene, job, bars)
+    }
+
+    /// Makes the plan of a job in a scene.
+    pub(super) fn planned(
+        &self,
+        robot: Robot,
+        scene: Scene,
+        job: Job,
+        bars: &Bars,
+    ) -> anyhow::Result<Made> {
         if job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
             let hover = 1e3 * job.tool.hover();
             bars.note(&format!(
@@ -278,8 +288,19 @@ impl PlanArgs {
 
     /// What is there, in the floor frame.
     pub(super) fn scene(&self, bars: &Bars) -> anyhow::Result<Scene> {
+        Ok(self.seen(bars)?.0)
+    }
+
+    /// The same with the scans as they were read.
+    pub(super) fn seen(&self, bars: &Bars) -> anyhow::Result<(Scene, Placed)> {
         bars.stage("scan", None);
-        scene(&self.scene, self.demo, &self.scans, self.seed, bars)
+        seen(&self.scene, self.demo, &self.scans, self.seed, bars)
+    }
+
+    /// Refuses before the work what cannot be written after it.
+    pub(super) fn writable(&self) -> anyhow::Result<()> {
+        let outs = [Some(&self.out), self.json.as_ref(), self.report.as_ref()];
+        outs.into_iter().flatten().try_for_each(|out| writable(out))
     }
 
     /// Whether they say where the plan begins or where the robot stands.
@@ -313,7 +334,7 @@ impl Made {
 }
 
 /// Writes what was asked for and prints the table.
-fn finish(args: &PlanArgs, made: &Made) -> anyhow::Result<u8> {
+pub(super) fn finish(args: &PlanArgs, made: &Made) -> anyhow::Result<u8> {
     let figures = &made.outcome.figures;
     let violations = &figures.verification.violations;
     // The plan first: it is there whatever becomes of the rest.

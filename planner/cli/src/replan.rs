@@ -10,6 +10,7 @@ use nullsweep_planner::link::replan::{Request, Start, replan};
 use nullsweep_planner::pipeline::After;
 use nullsweep_planner::plan::Plan;
 
+use crate::again::DoneArgs;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::numbers::seconds;
 use crate::output::{say, tell};
@@ -19,7 +20,7 @@ use crate::site::SiteArgs;
 #[derive(Debug, Args)]
 pub(super) struct ReplanArgs {
     /// The plan file that is being executed, or that was stopped: then the arm goes on from where it
-    /// stands.
+    /// stands; or, with --measured or --scan, that ran before.
     #[arg(long, value_name = "PLAN")]
     running: PathBuf,
     /// How long planning may take: the new plan begins in the first knot that is further ahead.
@@ -32,6 +33,8 @@ pub(super) struct ReplanArgs {
     /// the executor has stopped it.
     #[arg(long, value_name = "K", conflicts_with = "lead")]
     from: Option<usize>,
+    #[command(flatten)]
+    done: DoneArgs,
     #[command(flatten)]
     site: SiteArgs,
     /// Wait for the new plan's end as well.
@@ -54,6 +57,9 @@ pub(super) fn run(args: &ReplanArgs) -> anyhow::Result<u8> {
         .into());
     }
     let running = Plan::read(&args.running)?;
+    if args.done.is_asked() {
+        return args.done.run(&running, &args.site, &args.plan);
+    }
     let end = args.wait.then(|| Duration::from_secs_f64(10.0 * running.duration() + 600.0));
     let patience = Patience { admission: args.timeout, end };
     let site = args.site.site();

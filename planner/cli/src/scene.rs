@@ -1,16 +1,18 @@
 //! The scan that a command works on, from files or simulated, in the floor frame.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use clap::Args;
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 use nullsweep_collision::Obstacle;
 use nullsweep_planner::progress::Progress;
+use nullsweep_planner::regions::{Around, Spec};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_surface::{CleanConfig, CropBox, PlacedScan, Placement, scan, simulate, unseen};
 
 use crate::bars::Bars;
+use crate::floor::{Placed, Source};
 use crate::obstacles;
 use crate::placed::{Gravity, PlacedArgs, read_scans};
 use crate::room::{self, ObjectChoice};
@@ -42,6 +44,11 @@ pub(super) struct SceneArgs {
     /// [[cylinder]] (centre, radius, height, rpy) and [[sphere]] (centre, radius), in the floor frame.
     #[arg(long, value_name = "FILE")]
     obstacles: Option<PathBuf>,
+    /// What is to be swept, how often and how fast, what the tool keeps out of, and what nothing of the
+    /// robot enters: a TOML file with tables [[region]] (docs/process.md); without it the one that the
+    /// scene file names.
+    #[arg(long, value_name = "FILE")]
+    regions: Option<PathBuf>,
 }
 
 impl SceneArgs {
@@ -59,6 +66,18 @@ impl SceneArgs {
 
     pub(super) fn obstacles(&self) -> anyhow::Result<Vec<Obstacle>> {
         self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)
+    }
+
+    /// What is placed, and nothing measured.
+    pub(super) fn unscanned(&self, floor: Obstacle) -> anyhow::Result<Scene> {
+        let mut obstacles = vec![floor];
+        obstacles.extend(self.obstacles()?);
+        let nothing = Around {
+            scan: &PlacedScan::default(),
+            scan_to_floor: Isometry3::identity(),
+            seed: room::SEED,
+        };
+        with_regions(Scene::of_obstacles(obstacles), self.regions.as_deref(), &nothing)
     }
 
     /// How the scans stand.
@@ -88,13 +107,6 @@ enum UnseenArg {
     Free,
 }
 
-/// The floor, and the solid things that are placed.
-pub(super) fn bare(args: &SceneArgs) -> anyhow::Result<Scene> {
-    let mut floor = Scene::empty();
-    floor.obstacles.extend(args.obstacles()?);
-    Ok(floor)
-}
-
 /// Reads and joins the scans, or simulates `demo`'s with the noise of `seed`, and cleans them.
 pub(super) fn scene(
     args: &SceneArgs,
@@ -103,18 +115,29 @@ pub(super) fn scene(
     seed: u64,
     bars: &Bars,
 ) -> anyhow::Result<Scene> {
+    Ok(seen(args, demo, scans, seed, bars)?.0)
+}
+
+/// The same with the scans as they were read.
+pub(super) fn seen(
+    args: &SceneArgs,
+    demo: Option<Demo>,
+    scans: &[PathBuf],
+    seed: u64,
+    bars: &Bars,
+) -> anyhow::Result<(Scene, Placed)> {
     let (placed, (mut scene, flying)) = if let Some(choice) = args.object {
         ensure!(demo.is_none(), "--object chooses from a scan, not from a demo");
         let placed = read_scans(&args.placed, scans, seed, Gravity::Found, bars)?;
         let seen = room::object(&placed, choice, bars)?;
-        (placed.scan, seen)
+        (placed, seen)
     } else {
         let (placed, region) = match demo {
             Some(demo) => simulated(demo, seed),
-            None => (read_scans(&args.placed, scans, seed, Gravity::Given, bars)?.scan, None),
+            None => (read_scans(&args.placed, scans, seed, Gravity::Given, bars)?, None),
         };
         let region = args.crop.or(region);
-        let seen = Scene::seen(&placed, region.as_ref(), &CleanConfig::default())?;
+        let seen = Scene::seen(&placed.scan, region.as_ref(), &CleanConfig::default())?;
         (placed, seen)
     };
     if !flying.is_empty() {
@@ -129,7 +152,7 @@ pub(super) fn scene(
         UnseenArg::Forbid if scene.unseen.is_empty() => bars.note(
             "no view has a known sensor: which space was not seen is not known, and none is kept clear of",
         ),
-        UnseenArg::Forbid => scene.unseen = unseen::border(&placed, &scene.surface, 0.0),
+        UnseenArg::Forbid => scene.unseen = unseen::border(&placed.scan, &scene.surface, 0.0),
         UnseenArg::Free | UnseenArg::Avoid => {}
     }
     if demo.is_some() && args.placed.support_height > 0.0 {
@@ -143,14 +166,30 @@ pub(super) fn scene(
         ));
     }
     scene.obstacles.extend(args.obstacles()?);
-    Ok(scene)
+    let around = Around {
+        scan: &placed.scan,
+        scan_to_floor: placed.sources.first().map_or_else(Isometry3::identity, |first| first.pose),
+        seed: placed.seed.unwrap_or(room::SEED),
+    };
+    let regions = args.regions.as_deref().or(placed.regions.as_deref());
+    let scene = with_regions(scene, regions, &around)?;
+    Ok((scene, placed))
 }
 
-fn simulated(demo: Demo, seed: u64) -> (PlacedScan, Option<CropBox>) {
+/// The scene with the regions of a file, if there is one.
+fn with_regions(scene: Scene, file: Option<&Path>, around: &Around<'_>) -> anyhow::Result<Scene> {
+    let Some(file) = file else { return Ok(scene) };
+    let regions = Spec::read(file)?.find(around).with_context(|| file.display().to_string())?;
+    scene.with_regions(regions).with_context(|| file.display().to_string())
+}
+
+fn simulated(demo: Demo, seed: u64) -> (Placed, Option<CropBox>) {
     let (view, region) = match demo {
         Demo::Chair => (simulate::chair(seed), None),
         Demo::ChairSeat => (simulate::chair(seed), Some(simulate::chair_seat())),
         Demo::BobbyCar => (simulate::bobby_car(seed), None),
     };
-    (scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose)).0, region)
+    let (scan, pose) = scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose));
+    let source = Source { file: PathBuf::new(), scale: 1.0, pose };
+    (Placed { scan, sources: vec![source], regions: None, seed: None }, region)
 }

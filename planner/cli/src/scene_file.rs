@@ -17,6 +17,9 @@ use crate::room::name;
 pub(super) struct SceneFile {
     /// By which planes and objects were found, and points laid on meshes.
     seed: u64,
+    /// What of it is to be swept, kept out of, avoided: a file of regions, from the scene file's folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    regions: Option<PathBuf>,
     scan: Vec<ScanEntry>,
     #[serde(default)]
     plane: Vec<PlaneEntry>,
@@ -64,13 +67,17 @@ impl SceneFile {
     /// The file of a room, to be written at `path`.
     pub(super) fn of(path: &Path, placed: &Placed, room: &Room, seed: u64) -> anyhow::Result<Self> {
         let folder = std::path::absolute(path)?;
-        let mut scan = Vec::with_capacity(placed.sources.len());
-        for (Source { file, scale, pose }, view) in placed.sources.iter().zip(&placed.scan.views) {
+        let beside = |file: &Path| -> anyhow::Result<PathBuf> {
             let file = std::path::absolute(file)?;
             let near = folder.parent().and_then(|folder| file.strip_prefix(folder).ok());
+            Ok(near.map_or_else(|| file.clone(), Path::to_path_buf))
+        };
+        let regions = placed.regions.as_deref().map(beside).transpose()?;
+        let mut scan = Vec::with_capacity(placed.sources.len());
+        for (Source { file, scale, pose }, view) in placed.sources.iter().zip(&placed.scan.views) {
             let (t, r) = (pose.translation.vector, pose.rotation.coords);
             scan.push(ScanEntry {
-                file: near.map_or_else(|| file.clone(), Path::to_path_buf),
+                file: beside(file)?,
                 points: view.points.len(),
                 scale: *scale,
                 pose: [t.x, t.y, t.z, r.x, r.y, r.z, r.w],
@@ -93,7 +100,7 @@ impl SceneFile {
             centre: segment.centre.into(),
             stands_on: segment.stands_on + 1,
         });
-        Ok(Self { seed, scan, plane: plane.collect(), object: object.collect() })
+        Ok(Self { seed, regions, scan, plane: plane.collect(), object: object.collect() })
     }
 
     pub(super) fn write(&self, path: &Path) -> anyhow::Result<()> {
@@ -133,7 +140,8 @@ impl SceneFile {
             joined.join(scan::place(&raw, &placement).0);
             sources.push(Source { file: name, scale: entry.scale, pose });
         }
-        Ok(Placed { scan: joined, sources, seed: Some(file.seed) })
+        let regions = file.regions.map(|regions| folder.join(regions));
+        Ok(Placed { scan: joined, sources, regions, seed: Some(file.seed) })
     }
 }
 

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use nalgebra::Point3;
-use nullsweep_collision::Options;
+use nalgebra::{Isometry3, Point3};
+use nullsweep_collision::{Obstacle, Options};
 use nullsweep_planner::plan::{Plan, Program};
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::verify::{Given, Verification, verify};
@@ -22,7 +22,7 @@ use crate::output::{complain, say, writable};
 use crate::picture::{Sitter, picture};
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
-use crate::scene::{Demo, SceneArgs, bare, scene};
+use crate::scene::{Demo, SceneArgs, scene};
 use crate::sheet::sheet;
 
 #[derive(Debug, Args)]
@@ -167,7 +167,7 @@ impl AgainstArgs {
             let choice = swept.map_or_else(|| self.scene.clone(), |point| self.scene.or_at(point));
             scene(&choice, None, std::slice::from_ref(file), seed, bars)?
         } else if self.demo.is_none() && self.scans.is_empty() {
-            bare(&self.scene)?
+            self.scene.unscanned(Obstacle::floor(Isometry3::identity()))?
         } else {
             scene(&self.scene, self.demo, &self.scans, seed, bars)?
         };

@@ -5,6 +5,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use nalgebra::Isometry3;
+use nullsweep_collision::Obstacle;
 use nullsweep_planner::plan::{Plan, Program};
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::verify::{Given, verify};
@@ -20,7 +22,7 @@ use crate::output::{say, tell, writable};
 use crate::picture::{self, Flight, Posed, Sitter, picture, recorded};
 use crate::placed::{Gravity, read_scans};
 use crate::robot::{RobotArgs, differs, tool_file};
-use crate::scene::{Demo, SceneArgs, bare, scene};
+use crate::scene::{Demo, SceneArgs, scene};
 use crate::scene_command;
 
 #[derive(Debug, Args)]
@@ -155,7 +157,7 @@ fn of_plans(
         bars.stage("scan", None);
         Some(scene(&args.scene, args.demo, scans, args.seed.unwrap_or(plan.seed), bars)?)
     } else if plan.is_of_poses() && args.scene.has_obstacles() {
-        Some(bare(&args.scene)?)
+        Some(args.scene.unscanned(Obstacle::floor(Isometry3::identity()))?)
     } else {
         None
     };

@@ -5,6 +5,7 @@ use nullsweep_robot::JointVector;
 use parry3d_f64::shape::SharedShape;
 
 use crate::bodies::MAX_BODIES;
+use crate::field::Field;
 use crate::frame::Frame;
 use crate::motion::Slack;
 use crate::moving::{Moving, Pad, Touch};
@@ -90,22 +91,16 @@ impl World {
             Some(Touch::Rigid(margin)) => *margin,
             None => self.margins.environment,
         };
-        let need = margin + slack;
-        if shape
-            .tree
-            .all(|s| self.field.is_farther(&pose.apply(&s.centre), s.radius + need), |_| false)
-        {
-            return true;
-        }
-        self.field.all_near(&shape.solid, &pose.then(&shape.place), need, |p| {
-            let local = shape.place.apply_inverse(&pose.apply_inverse(p));
-            distance_for(&shape.solid, &local, need) >= need
-        })
+        is_clear_of(&self.field, shape, pose, margin + slack)
     }
 
     /// Whether the pad in contact is clear of the points that press on it: none is where its
-    /// keep-out boxes are.
+    /// keep-out boxes are; and of those that it may not touch.
     fn is_pad_clear(&self, shape: &Moving, pad: &Pad, pose: &Frame, slack: f64) -> bool {
+        let (keep_out, margin) = &self.keep_out;
+        if !is_clear_of(keep_out, shape, pose, margin + slack) {
+            return false;
+        }
         let far = |s: &Sphere| self.firm.is_farther(&pose.apply(&s.centre), s.radius + slack);
         let holds = |p: &Vector3<f64>| self.pad_value(shape, pad, pose, p, slack) >= slack;
         pad.tree.all(far, |_| false)
@@ -244,6 +239,16 @@ impl World {
         let relative = poses[large.body].inverse_then(&poses[small.body]);
         is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
     }
+}
+
+/// Whether a shape is at least `need` from all points of a field.
+fn is_clear_of(field: &Field, shape: &Moving, pose: &Frame, need: f64) -> bool {
+    let is_far = |s: &Sphere| field.is_farther(&pose.apply(&s.centre), s.radius + need);
+    shape.tree.all(is_far, |_| false)
+        || field.all_near(&shape.solid, &pose.then(&shape.place), need, |p| {
+            let local = shape.place.apply_inverse(&pose.apply_inverse(p));
+            distance_for(&shape.solid, &local, need) >= need
+        })
 }
 
 /// The bit of a fixed shape; beyond 127 they share the last one.

@@ -24,6 +24,12 @@ pub enum CollisionError {
         /// What is wrong with its mesh.
         error: MeshError,
     },
+    /// A hull of an obstacle holds no volume.
+    #[error("obstacle {obstacle} is flat, or a corner of it is not finite")]
+    FlatObstacle {
+        /// The obstacle.
+        obstacle: String,
+    },
     /// A link that the robot does not have.
     #[error("{named_by} names link {link}, which the robot does not have")]
     UnknownLink {

@@ -29,6 +29,8 @@ pub struct Exact {
     arm: Arm,
     scene: Scene,
     tree: Tree,
+    /// Of the points that not even the pad may touch.
+    keep_out: Tree,
 }
 
 /// More than rounding may take away from the distance of bounds. \[m\]
@@ -55,8 +57,9 @@ impl Exact {
 
     /// The check in a scene that is prepared.
     pub(crate) fn over(arm: Arm, scene: Scene) -> Self {
-        let tree = Tree::new(&scene.points.points);
-        Self { arm, scene, tree }
+        let [tree, keep_out] =
+            [&scene.points.points, &scene.points.keep_out].map(|points| Tree::new(points));
+        Self { arm, scene, tree, keep_out }
     }
 
     pub(crate) fn scene(&self) -> &Scene {
@@ -110,7 +113,27 @@ impl Exact {
         let pairs = self.pair_hits(&poses, &bounds);
         let obstacles = self.obstacle_hits(&poses, &bounds, &moving, true);
         let points = self.point_hits(q, &poses, &bounds, &moving, contact);
-        pairs.chain(obstacles).chain(points).take(most).collect()
+        let may_touch = contact == ToolContact::Allowed;
+        let keep_out = may_touch.then(|| self.keep_out_hits(&poses, &bounds)).into_iter().flatten();
+        pairs.chain(obstacles).chain(keep_out).chain(points).take(most).collect()
+    }
+
+    /// The pad too near to a point that not even it may touch.
+    fn keep_out_hits(&self, poses: &[Pose], bounds: &[Aabb]) -> impl Iterator<Item = Hit> {
+        let scene = &self.scene;
+        let margin = scene.margins.of_keep_out(&scene.tool);
+        let pads = (0..poses.len()).filter(|&i| scene.parts[i].is_pad);
+        pads.filter_map(move |i| {
+            let shape = &*scene.parts[i].shape;
+            let around = bounds[i].loosened(margin);
+            let corner = |v: Vec3| Point3::new(v.x, v.y, v.z);
+            self.keep_out.find(&corner(around.mins), &corner(around.maxs), |index| {
+                let point = scene.points.keep_out[index];
+                let distance = signed_distance(shape, &poses[i], &point);
+                let (link, with) = (scene.parts[i].name.clone(), With::KeepOut(point));
+                breaks(distance, margin).then_some(Hit { link, with, distance, margin })
+            })
+        })
     }
 
     fn pair_hits(&self, poses: &[Pose], bounds: &[Aabb]) -> impl Iterator<Item = Hit> {

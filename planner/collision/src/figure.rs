@@ -131,18 +131,12 @@ impl Obstacle {
     /// # Errors
     /// Its mesh cannot be used.
     pub fn triangles(&self, meshes: &MeshPaths) -> Result<Triangles, CollisionError> {
-        match &self.shape {
-            ObstacleShape::Floor => Ok(Triangles::default()),
-            ObstacleShape::Geometry(geometry) => Solid::prepare(geometry, self.pose, meshes)
-                .map(|found| {
-                    let pieces = found.solids.iter().map(|solid| triangles(solid, &found.pose));
-                    pieces.fold(Triangles::default(), Triangles::and)
-                })
-                .map_err(|error| CollisionError::ObstacleMesh {
-                    obstacle: self.name.clone(),
-                    error,
-                }),
+        if matches!(self.shape, ObstacleShape::Floor) {
+            return Ok(Triangles::default());
         }
+        let (solids, pose) = self.solids(meshes)?;
+        let pieces = solids.iter().map(|solid| triangles(solid, &pose));
+        Ok(pieces.fold(Triangles::default(), Triangles::and))
     }
 }
 

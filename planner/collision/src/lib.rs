@@ -18,7 +18,7 @@
 //!
 //! # What is around the robot
 //! [`Points`] are of three kinds: of the surface, raw measurements, and the border of what no view
-//! has seen. The rules below say where they differ.
+//! has seen. The rules below say where they differ. Some of them may be to keep out of.
 //!
 //! # The contact rule
 //! With [`ToolContact::Allowed`] the pad may touch. Its *prism* is the pad's rectangle grown by
@@ -30,6 +30,8 @@
 //! - A rigid shape that does not move against the tip (palm, fingers: they hold the sponge and end
 //!   only 11 mm behind its plane on the PR2) keeps the smaller of [`Margins::environment`] and
 //!   [`Margins::contact_clearance`] from every point.
+//! - From points to keep out of the pad keeps its full margin ([`Margins::environment`]), or as much as
+//!   it works before its plane where that is more, in the prism too.
 //! - Every other shape keeps its full margin.
 //!
 //! Obstacles are never contact.

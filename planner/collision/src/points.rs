@@ -18,6 +18,8 @@ pub struct Points<'a> {
     pub raw: &'a [Point3<f64>],
     /// On the border of the space that no view has seen, no farther apart than what moves is thick.
     pub unseen: &'a [Point3<f64>],
+    /// Those of the others that not even the pad may touch.
+    pub keep_out: &'a [Point3<f64>],
 }
 
 impl<'a, T: AsRef<[Point3<f64>]> + ?Sized> From<&'a T> for Points<'a> {
@@ -36,7 +38,12 @@ impl Points<'_> {
     pub(crate) fn sorted(&self) -> Sorted {
         let unseen = self.surface.len() + self.surroundings.len();
         let raw = unseen + self.unseen.len();
-        Sorted { points: self.all().copied().collect(), unseen, raw }
+        Sorted {
+            points: self.all().copied().collect(),
+            unseen,
+            raw,
+            keep_out: self.keep_out.to_vec(),
+        }
     }
 }
 
@@ -47,6 +54,8 @@ pub(crate) struct Sorted {
     unseen: usize,
     /// The first raw one.
     raw: usize,
+    /// Those that not even the pad may touch, once more.
+    pub(crate) keep_out: Vec<Point3<f64>>,
 }
 
 impl Sorted {

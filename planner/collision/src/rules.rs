@@ -1,6 +1,7 @@
 //! The rules that both checks keep: distances, the contact rule's switch, and what breaks them.
 
 use nalgebra::Point3;
+use nullsweep_robot::Tool;
 
 /// What the fast check asks for beyond every margin, so that its rounding never makes it pass what
 /// the exact check rejects. \[m\]
@@ -31,6 +32,14 @@ impl Default for Margins {
             contact_front: 0.015,
             contact_clearance: 0.001,
         }
+    }
+}
+
+impl Margins {
+    /// What the pad keeps from a point that not even it may touch: its margin to everything else, and
+    /// as far as it works before its plane. \[m\]
+    pub(crate) fn of_keep_out(&self, tool: &Tool) -> f64 {
+        self.environment.max(tool.hover())
     }
 }
 
@@ -65,6 +74,8 @@ pub enum With {
     ScanPoint(Point3<f64>),
     /// Space that no view has seen, at this place in the root frame. \[m\]
     Unseen(Point3<f64>),
+    /// A point that not even the pad may touch, in the root frame. \[m\]
+    KeepOut(Point3<f64>),
     /// An obstacle.
     Obstacle(String),
 }
@@ -77,6 +88,9 @@ impl std::fmt::Display for Hit {
             With::Link(name) => write!(f, "{name}")?,
             With::Obstacle(name) => write!(f, "obstacle {name}")?,
             With::ScanPoint(p) => write!(f, "scan point ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)?,
+            With::KeepOut(p) => {
+                write!(f, "a point to keep out of ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)?;
+            }
             With::Unseen(p) => write!(f, "unseen space at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)?,
         }
         write!(f, ", must keep {margin:.1} mm")

@@ -10,14 +10,14 @@ use parry3d_f64::shape::SharedShape;
 use crate::bodies::{Bodies, MAX_BODIES};
 use crate::error::CollisionError;
 use crate::mesh::MeshPaths;
-use crate::obstacle::{Obstacle, ObstacleShape};
+use crate::obstacle::Obstacle;
 use crate::options::Options;
 use crate::pairs::{self, Pairs, sample};
 use crate::parts::{self, Part, Parts};
 use crate::points::{Points, Sorted};
 use crate::rules::Margins;
 use crate::shapes::{distance, pose, poses};
-use crate::solid::{Prepared, Solid};
+use crate::solid::Solid;
 
 /// A robot with its tool, scan and obstacles, all shapes prepared; in the root frame.
 pub(crate) struct Scene {
@@ -135,16 +135,8 @@ fn grounded(
 impl PreparedObstacle {
     /// One for each convex piece of it.
     fn all(obstacle: &Obstacle, meshes: &MeshPaths) -> Result<Vec<Self>, CollisionError> {
-        let Obstacle { name, shape, pose, carries_robot } = obstacle;
-        let (solids, pose) = match shape {
-            ObstacleShape::Floor => (vec![Solid::HalfSpace], *pose),
-            ObstacleShape::Geometry(geometry) => {
-                let error = |error| CollisionError::ObstacleMesh { obstacle: name.clone(), error };
-                let Prepared { solids, pose, .. } =
-                    Solid::prepare(geometry, *pose, meshes).map_err(error)?;
-                (solids, pose)
-            }
-        };
+        let Obstacle { name, carries_robot, .. } = obstacle;
+        let (solids, pose) = obstacle.solids(meshes)?;
         let prepared = |solid: Solid| {
             let (name, carries_robot) = (name.clone(), *carries_robot);
             Self { name, shape: solid.to_parry(), solid, pose, carries_robot }
@@ -165,7 +157,8 @@ fn check_input(points: &Points<'_>, margins: &Margins) -> Result<(), CollisionEr
             return Err(CollisionError::Margin { name, value });
         }
     }
-    match points.all().position(|p| !p.iter().all(|x| x.is_finite())) {
+    let all = points.all().chain(points.keep_out);
+    match all.into_iter().position(|p| !p.iter().all(|x| x.is_finite())) {
         Some(index) => Err(CollisionError::NotFinite { index }),
         None => Ok(()),
     }

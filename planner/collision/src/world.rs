@@ -37,6 +37,8 @@ pub struct World {
     pub(crate) field: Arc<Field>,
     /// Those that press on the pad.
     pub(crate) firm: Arc<Field>,
+    /// Those that not even the pad may touch, and what it keeps from them. \[m\]
+    pub(crate) keep_out: (Field, f64),
     pub(crate) reach: Reach,
     pub(crate) margins: Margins,
     pub(crate) contact: Contact,
@@ -78,6 +80,9 @@ impl World {
         let (all, firm) = (&scene.points.points, scene.points.firm());
         let field = near(all);
         let firm = if firm.len() == all.len() { Arc::clone(&field) } else { near(firm) };
+        let apart = margins.of_keep_out(tool);
+        let keep_out = &scene.points.keep_out;
+        let keep_out = (Field::new(keep_out, &reach.centre, reach.radius + apart), apart);
         let ranges = never::ranges(arm, &reach.stroke);
         leave_out(&bodies, &ranges, &mut moving, &fixed, &mut pairs, &margins);
         let exact = Exact::over(arm.clone(), scene);
@@ -88,6 +93,7 @@ impl World {
             pairs,
             field,
             firm,
+            keep_out,
             reach,
             margins,
             contact,

@@ -73,7 +73,8 @@ pub fn run(
     progress.stage("timing", None);
     let plan = poses::assemble(given, &pieces);
     let stops = ends(&plan);
-    let plan = Plan { left, ..setup.speed.set(plan, cell, &stops) };
+    let regions = scene.regions.marks(&[]);
+    let plan = Plan { left, regions, ..setup.speed.set(plan, cell, &stops) };
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::attempt::Sequence;
 use super::left_out::LeftOut;
+use super::rounds::RoundFigures;
 use crate::cost::{self, Effort};
 use crate::plan::Plan;
 use crate::roadmap::Graph;
@@ -68,6 +69,9 @@ pub struct Figures {
     /// How often it passes over what it sweeps.
     #[serde(flatten)]
     pub passes: Passes,
+    /// What came of each round, where there are several or the tool has a speed of its own there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<RoundFigures>,
     /// How well the tool speed that was asked for is held.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub tool_speed: Option<Held>,

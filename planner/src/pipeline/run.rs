@@ -6,22 +6,24 @@ use nullsweep_surface::{Patch, Scan, patches};
 use rayon::prelude::*;
 
 use super::attempt::{Attempt, Planning};
-use super::choice::{Made, made};
+use super::choice::Made;
 use super::clock::Clock;
 use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
 use super::left_out::{Known, LeftOut, in_words, left_out};
+use super::rounds::Course;
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
-use super::swept::{points_of, swept_before, without_swept};
+use super::swept::{passed_before, points_of, without_swept};
 use crate::cost;
 use crate::motion::Memo;
 use crate::plan::Plan;
 use crate::progress::Progress;
+use crate::regions::Label;
 use crate::roadmap::Graph;
-use crate::sweep::{Held, passes};
+use crate::sweep::{Held, Passes, passes_over};
 use crate::timing::Rest;
 use crate::verify::{Given, verify};
 use crate::workcell::{Bed, Scene, Workcell, reach};
@@ -70,12 +72,9 @@ pub fn run(
     let setting = clock.time("stance", || settle(robot, &free_arm, scene, &all, job))?;
     let Setting { stance, arm, scene: here, patches, world, others } = setting;
     let scan = &here.surface;
-    for note in world.notes() {
-        progress.note(note);
-    }
+    world.notes().iter().for_each(|note| progress.note(note));
     let (start, rest) = begin(job, &arm, &world, progress)?;
-    let mut already = swept_before(job, rest.as_ref(), &arm, scan)?;
-    already.iter_mut().zip(&job.spared).for_each(|(already, spared)| *already |= spared);
+    let course = Course::new(scene, job, passed_before(job, rest.as_ref(), &arm, scan)?);
 
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
     progress.stage("reach", Some(patches.len()));
@@ -101,18 +100,19 @@ pub fn run(
         velocity: cost::velocities(&arm, job.v_max),
         continues: job.after.as_ref().map_or(Ok(None), After::continues)?,
         to_sweep: &points_of(scan, &patches, &reachable),
-        already: &already,
+        already: &course.already(),
         progress,
         memo: Memo::new(job.seed),
     };
-    let Made { attempt, mut plan } = made(&planning, patches, samples, rest.as_ref(), &mut clock)?;
+    let (Made { attempt, mut plan }, rounds) =
+        course.made(&planning, (patches, samples), rest.as_ref(), &mut clock)?;
+    course.mark(&mut plan, planning.to_sweep);
     let Attempt { patches, graph, sequence, places, .. } = attempt;
 
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
     let verification = clock.time("verify", || verify(&plan, given, &|| progress.tick()))?;
-    let mut done = verification.swept.clone();
-    done.iter_mut().zip(&job.spared).for_each(|(done, spared)| *done |= spared);
+    let done = course.done(&verification.swept);
     let known = Known {
         scan,
         patches: &found,
@@ -123,6 +123,7 @@ pub fn run(
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
     let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
     plan.left = left_out.iter().map(LeftOut::told).collect();
+    plan.left.extend(course.unwanted(&verification.swept));
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {
@@ -138,7 +139,8 @@ pub fn run(
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
-        passes: passes(scan, plan.trajectory(), &arm),
+        passes: Passes::of(&passes_over(scan, [plan.trajectory()], &arm)),
+        rounds,
         tool_speed: job.tool_speed.map(|speed| Held::of(plan.trajectory(), &arm, speed)),
         verification,
         seed: job.seed,
@@ -154,13 +156,29 @@ pub fn run(
 /// # Errors
 /// [`PipelineError::NoPatches`].
 pub fn patches_of(scene: &Scene, job: &Job) -> Result<Vec<Patch>, PipelineError> {
-    let found = patches::find(&scene.surface, &job.patches, job.seed);
+    let found = wanted_patches(scene, job);
     let bed = Bed::new(scene, &job.tool);
     let laid: Vec<Patch> = found.into_par_iter().filter_map(|patch| bed.laid(patch)).collect();
     if laid.is_empty() {
         return Err(PipelineError::NoPatches { points: scene.surface.points.len() });
     }
     Ok(laid)
+}
+
+/// The patches of what is to be swept, region by region.
+fn wanted_patches(scene: &Scene, job: &Job) -> Vec<Patch> {
+    let Scene { surface, regions, .. } = scene;
+    if regions.is_empty() {
+        return patches::find(surface, &job.patches, job.seed);
+    }
+    let labels = regions.labels(&surface.points);
+    let all = std::iter::once(Label::None).chain((0..regions.all().len()).map(Label::Sweep));
+    let wanted = all.filter(|label| regions.is_wanted(*label));
+    let of = |label: Label| {
+        let own: Vec<bool> = labels.iter().map(|l| *l == label).collect();
+        patches::find_among(surface, &own, &job.patches, job.seed)
+    };
+    wanted.flat_map(of).collect()
 }
 
 /// Where the arm begins; for a plan that joins another one in motion, after the way to rest on the

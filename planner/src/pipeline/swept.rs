@@ -6,7 +6,7 @@ use nullsweep_surface::{Patch, Scan};
 use super::error::PipelineError;
 use super::job::{After, Job};
 use crate::plan::Stretch;
-use crate::sweep::coverage;
+use crate::sweep::passes_over;
 use crate::timing::Rest;
 use crate::workcell::Sample;
 
@@ -21,23 +21,23 @@ pub(super) fn points_of(scan: &Scan, patches: &[Patch], marked: &[bool]) -> Vec<
     points
 }
 
-/// Which points the plan that a job goes on from, and those that led to it, have swept by where the
-/// arm comes to `rest` on it, or else by its knot; nothing where it is to be swept again.
-pub(super) fn swept_before(
+/// How often the plan that a job goes on from, and those that led to it, have passed over each point by
+/// where the arm comes to `rest` on it, or else by its knot; never where it is to be swept again.
+pub(super) fn passed_before(
     job: &Job,
     rest: Option<&Rest>,
     arm: &Arm,
     scan: &Scan,
-) -> Result<Vec<bool>, PipelineError> {
+) -> Result<Vec<u32>, PipelineError> {
     let Some(After { plan, knot, again: false, .. }) = &job.after else {
-        return Ok(vec![false; scan.points.len()]);
+        return Ok(vec![0; scan.points.len()]);
     };
     let (knots, knot) = (plan.knots.len(), rest.map_or(*knot, |rest| rest.at));
     if knot >= knots {
         return Err(PipelineError::NoSuchKnot { knots, knot });
     }
     let followed = plan.followed(knot);
-    Ok(coverage::swept_by(scan, followed.iter().map(Stretch::trajectory), arm))
+    Ok(passes_over(scan, followed.iter().map(Stretch::trajectory), arm))
 }
 
 /// Share of a patch's points from which on it counts as swept.

@@ -14,6 +14,7 @@ use super::knot::PlanKnot;
 use super::seal::Seal;
 use super::settings::{CostKind, Method, Profile};
 use super::trajectory::Trajectory;
+use crate::regions::Mark;
 
 /// A timed joint path that sweeps a surface, with everything needed to check and to publish it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,6 +57,9 @@ pub struct Plan {
     pub patches: Vec<[f64; 3]>,
     /// The scanned points that the plan is to sweep, in the root frame. \[m\]
     pub surface: Vec<SurfaceSample>,
+    /// The regions that it was made for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<Mark>,
     /// For a plan that goes on from another one: where.
     pub continues: Option<Continues>,
     /// What was followed before its first knot, oldest first: of each plan that led to this one the
@@ -174,6 +178,7 @@ impl Plan {
             knots,
             patches: Vec::new(),
             surface: Vec::new(),
+            regions: Vec::new(),
             continues: None,
             past: Vec::new(),
             left: Vec::new(),

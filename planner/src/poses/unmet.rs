@@ -129,6 +129,7 @@ fn thing(hit: &Hit) -> String {
         With::Link(_) => "the robot itself".into(),
         With::Obstacle(name) => format!("obstacle {name}"),
         With::ScanPoint(_) => "what was measured".into(),
+        With::KeepOut(_) => "what the tool is to keep out of".into(),
         With::Unseen(_) => "unseen space".into(),
     }
 }

@@ -43,6 +43,25 @@ impl Graph {
         Self { edges, incident, components, candidates, apart: apart.into_iter().collect() }
     }
 
+    /// It with the edges of another graph, whose nodes stand at a `place` among its own.
+    #[must_use]
+    pub fn joined(mut self, other: Self, place: impl Fn(usize) -> usize) -> Self {
+        for edge in other.edges {
+            let edge = Edge { a: place(edge.a), b: place(edge.b), ..edge };
+            let most = edge.a.max(edge.b);
+            self.incident.resize(self.incident.len().max(most + 1), Vec::new());
+            self.incident[edge.a].push(self.edges.len());
+            self.incident[edge.b].push(self.edges.len());
+            self.edges.push(edge);
+        }
+        let components = other.components.into_iter();
+        self.components.extend(components.map(|of| of.into_iter().map(&place).collect()));
+        self.components.sort_by_key(|component: &Vec<usize>| std::cmp::Reverse(component.len()));
+        self.candidates += other.candidates;
+        self.apart.extend(other.apart.into_iter().map(|(a, b)| (place(a), place(b))));
+        self
+    }
+
     /// The edge between two patches.
     #[must_use]
     pub fn between(&self, a: usize, b: usize) -> Option<usize> {

@@ -11,7 +11,7 @@ use crate::pipeline::is_swept;
 use crate::plan::Unswept;
 use crate::workcell::{Cause, Stance, Workcell, obstruction};
 
-/// Points that are not swept, by cause, what concerns most of them first.
+/// Points that are to be and are not swept, by cause, what concerns most of them first.
 pub(super) fn unswept(of: &Rounds<'_>) -> Result<Vec<Unswept>, StopsError> {
     let union = of.state.survey.union(of.patches.len());
     let mut owner: Vec<Option<usize>> = vec![None; of.swept.len()];
@@ -42,7 +42,10 @@ pub(super) fn unswept(of: &Rounds<'_>) -> Result<Vec<Unswept>, StopsError> {
     let whys = whys.into_iter().collect::<Result<Vec<_>, _>>()?;
     let uneven = Cause::Uneven.to_string();
     let mut rows: BTreeMap<&str, (usize, Vec<usize>)> = BTreeMap::new();
-    for (owner, _) in owner.iter().zip(&of.swept).filter(|(_, swept)| !**swept) {
+    let labels = of.scene.regions.labels(&of.scene.surface.points);
+    let wanted = labels.iter().map(|label| of.scene.regions.is_wanted(*label));
+    let points = owner.iter().zip(&of.swept).zip(wanted);
+    for ((owner, _), _) in points.filter(|((_, swept), wanted)| *wanted && !**swept) {
         let row = rows.entry(owner.map_or(uneven.as_str(), |p| &whys[p])).or_default();
         row.0 += 1;
         row.1.extend(owner);
@@ -106,6 +109,7 @@ fn kind(cause: &Cause) -> String {
         }
         Cause::Object { .. } => "from nowhere: the robot would meet the object",
         Cause::Unseen { .. } => "from nowhere: the robot would be in unseen space",
+        Cause::KeepOut => "from nowhere: the pad would touch what it is to keep out of",
         Cause::Press => "from nowhere: the pad would be pressed in too deep",
         Cause::NoMotion | Cause::Passed | Cause::Uneven | Cause::Missed => {
             "from nowhere that was looked at"

@@ -12,6 +12,6 @@ mod segment;
 pub use held::{Held, Slower};
 pub use pace::{DIP, JointPace, Pace};
 pub use pads::{Pad, contact_motion, pad_motion};
-pub use passes::{Passes, passes};
+pub use passes::{Passes, passes_over};
 pub(crate) use percentile::percentile;
 pub use segment::distance_to_segment;

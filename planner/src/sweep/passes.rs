@@ -1,6 +1,6 @@
 //! How often the pad passes over each point.
 
-use nullsweep_robot::{Arm, Tool};
+use nullsweep_robot::Arm;
 use nullsweep_surface::Scan;
 use serde::{Deserialize, Serialize};
 
@@ -9,28 +9,50 @@ use super::pads::contact_motion;
 use super::percentile::percentile;
 use crate::plan::Trajectory;
 
-/// How often the pad passes over the points that it sweeps.
+/// So many passes and more are counted together.
+const MANY: usize = 8;
+
+/// How often the pad passes over the points of the scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Passes {
-    /// In the median.
+    /// In the median, of those that it sweeps.
     pub passes_p50: f64,
     /// 95th percentile.
     pub passes_p95: f64,
+    /// How many points it passes over 0, 1, 2 … times; the last one: 8 times or more.
+    #[serde(default)]
+    pub passes_histogram: [usize; MANY + 1],
 }
 
-/// Counts the passes of a motion over the swept points of a scan, both in one frame: a pass lasts
-/// from when the pad comes over a point to when it has left it.
+/// How often the pad passes over each point of a scan in some motions, all in one frame: a pass lasts from
+/// when the pad comes over a point to when it has left it.
 #[must_use]
-pub fn passes(scan: &Scan, motion: Trajectory<'_>, arm: &Arm) -> Passes {
-    let tool: &Tool = motion.tool;
-    let mut counts = vec![(0usize, usize::MAX); scan.points.len()];
-    visit_swept(scan, &contact_motion(motion, arm), tool, |pose, point| {
-        let (count, last) = &mut counts[point];
-        *count += usize::from(last.wrapping_add(1) != pose || *count == 0);
-        *last = pose;
-    });
-    let swept = counts.iter().map(|(count, _)| *count as f64).filter(|count| *count > 0.0);
-    let mut swept: Vec<f64> = swept.collect();
-    swept.sort_by(f64::total_cmp);
-    Passes { passes_p50: percentile(&swept, 0.5), passes_p95: percentile(&swept, 0.95) }
+pub fn passes_over<'a>(
+    scan: &Scan,
+    motions: impl IntoIterator<Item = Trajectory<'a>>,
+    arm: &Arm,
+) -> Vec<u32> {
+    let mut counts = vec![0; scan.points.len()];
+    for motion in motions {
+        let mut last = vec![None; scan.points.len()];
+        visit_swept(scan, &contact_motion(motion, arm), motion.tool, |pose, point| {
+            counts[point] += u32::from(last[point].is_none_or(|last: usize| last + 1 != pose));
+            last[point] = Some(pose);
+        });
+    }
+    counts
+}
+
+impl Passes {
+    /// Of how often the pad passes over each point.
+    #[must_use]
+    pub fn of(counts: &[u32]) -> Self {
+        let mut passes_histogram = [0; MANY + 1];
+        counts.iter().for_each(|count| passes_histogram[(*count as usize).min(MANY)] += 1);
+        let swept = counts.iter().filter(|count| **count > 0).map(|count| f64::from(*count));
+        let mut swept: Vec<f64> = swept.collect();
+        swept.sort_by(f64::total_cmp);
+        let [passes_p50, passes_p95] = [0.5, 0.95].map(|share| percentile(&swept, share));
+        Self { passes_p50, passes_p95, passes_histogram }
+    }
 }

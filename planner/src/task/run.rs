@@ -60,7 +60,8 @@ pub fn run(
     progress.stage("timing", None);
     let at_rest: Vec<usize> =
         (0..plan.knots.len()).filter(|&k| plan.knots[k].patch.is_some()).collect();
-    let plan = Plan { left, ..setup.speed.set(plan, cell, &at_rest) };
+    let regions = scene.regions.marks(&[]);
+    let plan = Plan { left, regions, ..setup.speed.set(plan, cell, &at_rest) };
     let calc_time_s = started.elapsed().as_secs_f64();
 
     progress.stage("verify", Some(plan.knots.len()));

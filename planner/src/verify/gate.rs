@@ -8,11 +8,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::collisions::{collisions, standing};
+use super::keep_out::keep_out;
 use super::kinematics::kinematics;
 use super::press::{Press, press};
 use super::violation::{Violation, ViolationKind};
 use crate::plan::{Plan, PlanError, Stretch};
-use crate::sweep::{Pad, coverage, pad_motion, percentile};
+use crate::regions::{Label, Mark, RegionFigures};
+use crate::sweep::{Pad, coverage, pad_motion, passes_over, percentile};
 use crate::workcell::Scene;
 
 /// The figures of a verified plan.
@@ -38,6 +40,9 @@ pub struct Verification {
     pub coverage_all: f64,
     /// Share of the points of reachable patches that are so swept.
     pub coverage_reachable: f64,
+    /// What came of each region.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<RegionFigures>,
     /// For each scanned point whether it is swept.
     #[serde(skip)]
     pub swept: Vec<bool>,
@@ -56,6 +61,9 @@ pub struct Against {
     pub unseen_points: usize,
     /// Solid things.
     pub obstacles: usize,
+    /// Points that the tool keeps out of.
+    #[serde(default)]
+    pub keep_out_points: usize,
     /// Links whose meshes are missing: capsules stand for them, a guess, so that what was found
     /// says nothing of the real ones.
     pub guessed_links: Vec<String>,
@@ -79,6 +87,7 @@ impl Against {
             raw_points: scene.raw.len(),
             unseen_points: scene.unseen.len(),
             obstacles: scene.obstacles.len(),
+            keep_out_points: scene.keep_out.len(),
             guessed_links: exact.guessed_links().to_vec(),
             grounded_links: exact.grounded_links().into_iter().collect(),
         }
@@ -136,6 +145,19 @@ pub enum VerifyError {
         /// Points in the scene.
         found: usize,
     },
+    /// The plan was made for regions that are not given, or otherwise.
+    #[error(
+        "the plan was made for region {name}, {points} points: {}",
+        found.map_or("there is no such region".into(), |n| format!("here it holds {n}"))
+    )]
+    OtherRegions {
+        /// The first such region.
+        name: String,
+        /// Points of the surface that it held.
+        points: usize,
+        /// How many it holds in the scene; `None`: no region of its name and kind is there.
+        found: Option<usize>,
+    },
     /// The plan is of a scan as long, but elsewhere.
     #[error(
         "point {point} of the scan lies {distance_m:.4} m from where the plan has it: the scene is \
@@ -168,6 +190,9 @@ pub fn verify(
     if is_scanned {
         same_scan(plan, scan)?;
     }
+    // In the frame in which they are given: a point on a border is on the same side again.
+    let labels = given.scene.regions.labels(&given.scene.surface.points);
+    same_regions(plan, &scene.regions.marks(&labels))?;
     let mut violations = kinematics(plan, &arm);
     let is_finite = !violations.iter().any(|v| v.kind == ViolationKind::NotFinite);
     let bounded = plan.check_bounds();
@@ -182,6 +207,7 @@ pub fn verify(
     violations.extend(standing(&exact));
     let (collisions, collision_checks) = collisions(plan, &arm, &exact, tick);
     violations.extend(collisions);
+    violations.extend(keep_out(plan, &arm, &scene.keep_out));
     violations.sort_by_key(|v| v.knot);
 
     let pads = pad_motion(plan.trajectory(), &arm);
@@ -206,6 +232,7 @@ pub fn verify(
         scan_distance_max_m: distances.last().copied().unwrap_or(0.0),
         coverage_all: share(&|_| true),
         coverage_reachable: share(&|i| plan.surface[i].reachable),
+        regions: by_region(plan, &arm, &scene, &labels),
         swept,
     })
 }
@@ -226,6 +253,29 @@ pub fn same_scan(plan: &Plan, scan: &Scan) -> Result<(), VerifyError> {
         }
     }
     Ok(())
+}
+
+/// Whether the regions that a plan was made for are there.
+fn same_regions(plan: &Plan, found: &[Mark]) -> Result<(), VerifyError> {
+    for Mark { name, kind, points } in &plan.regions {
+        let found = found.iter().find(|f| f.name == *name && f.kind == *kind);
+        let found = found.map(|f| f.points);
+        if found != Some(*points) {
+            return Err(VerifyError::OtherRegions { name: name.clone(), points: *points, found });
+        }
+    }
+    Ok(())
+}
+
+/// What came of each region: of this plan, and of those that led to it.
+fn by_region(plan: &Plan, arm: &Arm, scene: &Scene, labels: &[Label]) -> Vec<RegionFigures> {
+    if scene.regions.is_empty() || labels.is_empty() {
+        return Vec::new();
+    }
+    let motions = plan.past.iter().map(Stretch::trajectory).chain([plan.trajectory()]);
+    let passes = passes_over(&scene.surface, motions, arm);
+    let reachable: Vec<bool> = plan.surface.iter().map(|sample| sample.reachable).collect();
+    RegionFigures::all(&scene.regions, labels, &passes, &reachable)
 }
 
 /// The arm as the plan has it: its held joints where the plan holds them.

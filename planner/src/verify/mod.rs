@@ -10,6 +10,7 @@
 
 mod collisions;
 mod gate;
+mod keep_out;
 mod kinematics;
 mod press;
 mod violation;

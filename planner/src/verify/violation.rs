@@ -32,4 +32,6 @@ pub enum ViolationKind {
     SoftLimit,
     /// The arm or its tool collides, or the body does where it stands.
     Collision,
+    /// The pad touches what it is to keep out of.
+    KeepOut,
 }

@@ -43,6 +43,8 @@ pub enum Cause {
         /// What meets them.
         link: String,
     },
+    /// A place that the tool is to keep out of, beside it.
+    KeepOut,
     /// Space that no view has seen.
     Unseen {
         /// What would be in it.
@@ -68,6 +70,7 @@ impl std::fmt::Display for Cause {
             Self::Itself { link, other } => write!(f, "{link} meets {other}"),
             Self::Solid { link, name } => write!(f, "{link} meets the {name}"),
             Self::Object { link } => write!(f, "{link} meets the object"),
+            Self::KeepOut => f.write_str("the pad would touch what it is to keep out of"),
             Self::Unseen { link } => write!(f, "{link} would be in unseen space"),
             Self::Press => f.write_str("the pad is pressed in too deep"),
             Self::NoMotion => f.write_str("reached, but no motion to it was found"),
@@ -153,6 +156,7 @@ fn cause(hit: Hit, pad: &str) -> Cause {
         With::Obstacle(name) => Cause::Solid { link, name },
         With::ScanPoint(_) if link == pad => Cause::Press,
         With::ScanPoint(_) => Cause::Object { link },
+        With::KeepOut(_) => Cause::KeepOut,
         With::Unseen(_) => Cause::Unseen { link },
     }
 }

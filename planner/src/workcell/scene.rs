@@ -10,6 +10,8 @@ use nullsweep_surface::{
     unseen,
 };
 
+use crate::regions::{RegionError, Regions};
+
 /// The surface to sweep and what is around it, in one frame: the floor frame where it is
 /// given.
 #[derive(Clone, Debug)]
@@ -24,6 +26,10 @@ pub struct Scene {
     pub unseen: Vec<Point3<f64>>,
     /// Solid things besides the scan.
     pub obstacles: Vec<Obstacle>,
+    /// What of it is to be swept, and how; what is not to be touched or entered.
+    pub regions: Regions,
+    /// The points of surface and surroundings that the tool keeps out of. \[m\]
+    pub keep_out: Vec<Point3<f64>>,
 }
 
 /// Side of the cubes of which a sketch keeps one point. \[m\]
@@ -73,7 +79,19 @@ impl Scene {
         let (points, normals, raw) = (Vec::new(), Vec::new(), Vec::new());
         let surface = Scan { points, normals, raw, spacing: 0.0 };
         let (surroundings, raw, unseen) = (Vec::new(), Vec::new(), Vec::new());
-        Self { surface, surroundings, raw, unseen, obstacles }
+        let (regions, keep_out) = (Regions::default(), Vec::new());
+        Self { surface, surroundings, raw, unseen, obstacles, regions, keep_out }
+    }
+
+    /// The scene with regions in its frame, those to avoid as solid things.
+    ///
+    /// # Errors
+    /// A region matches nothing: see [`Regions::check`].
+    pub fn with_regions(mut self, regions: Regions) -> Result<Self, RegionError> {
+        regions.check(&self.surface.points, &self.surroundings)?;
+        self.obstacles.extend(regions.solids());
+        self.keep_out = regions.keep_out(self.surface.points.iter().chain(&self.surroundings));
+        Ok(Self { regions, ..self })
     }
 
     /// What placed views show, on the floor: the surface in a region, or all of it, and everything
@@ -105,10 +123,10 @@ impl Scene {
     /// The scene with nothing to sweep: all that was measured is in the way.
     #[must_use]
     pub fn in_the_way(self) -> Self {
-        let Self { surface, mut surroundings, raw, unseen, obstacles } = self;
+        let Self { surface, mut surroundings, raw, unseen, obstacles, regions, keep_out } = self;
         surroundings.extend(surface.points);
         surroundings.extend(raw);
-        Self { surroundings, unseen, ..Self::of_obstacles(obstacles) }
+        Self { surroundings, unseen, regions, keep_out, ..Self::of_obstacles(obstacles) }
     }
 
     /// The scene with fewer points around the surface, to judge many stances by.
@@ -116,8 +134,7 @@ impl Scene {
     pub fn sketch(&self) -> Self {
         let surroundings = thinned(&self.surroundings, SKETCH);
         let unseen = thinned(&self.unseen, SKETCH);
-        let (surface, obstacles) = (self.surface.clone(), self.obstacles.clone());
-        Self { surface, surroundings, raw: Vec::new(), unseen, obstacles }
+        Self { surroundings, raw: Vec::new(), unseen, ..self.clone() }
     }
 
     /// A point in each cube of a side \[m\] that holds something: what was measured, what no view has
@@ -142,19 +159,14 @@ impl Scene {
         let kept: Vec<u32> = (0..self.surface.points.len() as u32)
             .filter(|&i| is_near(&self.surface.points[i as usize]))
             .collect();
-        let Scan { points, normals, raw, spacing } = &self.surface;
-        let surface = Scan {
-            points: kept.iter().map(|&i| points[i as usize]).collect(),
-            normals: kept.iter().map(|&i| normals[i as usize]).collect(),
-            raw: kept.iter().map(|&i| raw[i as usize]).collect(),
-            spacing: *spacing,
-        };
         let scene = Self {
-            surface,
+            surface: self.surface.of(&kept),
             surroundings: some(&self.surroundings),
             raw: some(&self.raw),
             unseen: some(&self.unseen),
             obstacles: self.obstacles.clone(),
+            regions: self.regions.clone(),
+            keep_out: some(&self.keep_out),
         };
         (scene, kept)
     }
@@ -170,13 +182,15 @@ impl Scene {
             raw: all(&self.raw),
             unseen: all(&self.unseen),
             obstacles: self.obstacles.iter().map(moved).collect(),
+            regions: self.regions.transformed(pose),
+            keep_out: all(&self.keep_out),
         }
     }
 
     /// All points of it, as the collision checks take them.
     #[must_use]
     pub fn points(&self) -> Points<'_> {
-        let Self { surface, surroundings, raw, unseen, .. } = self;
-        Points { surface: &surface.points, surroundings, raw, unseen }
+        let Self { surface, surroundings, raw, unseen, keep_out, .. } = self;
+        Points { surface: &surface.points, surroundings, raw, unseen, keep_out }
     }
 }

@@ -4,7 +4,7 @@
 //! [`Scan`]: points with normals. [`patches`] cuts it into the planar pieces that a tool has to
 //! visit; a [`Surface`] lies between its points and gives the line from one piece to the next.
 //! [`mod@room`] finds the planes and objects of a whole scene, [`mod@register`] lays one view onto
-//! others. [`simulate`] makes scans where no camera is at hand. Nothing here knows a robot.
+//! others, [`mod@change`] says what is another way in a later scan. [`simulate`] makes scans where no camera is at hand. Nothing here knows a robot.
 //!
 //! All lengths are metres, all angles radians. The same input and seed give bit-identical results,
 //! whatever the number of threads.
@@ -41,6 +41,7 @@ mod thin;
 
 pub mod scan;
 
+pub mod change;
 pub mod register;
 pub mod room;
 

@@ -159,6 +159,17 @@ pub fn find(scan: &Scan, config: &PatchConfig, seed: u64) -> Vec<Patch> {
     patches
 }
 
+/// The patches of the points that `wanted` marks, as if there were no others.
+#[must_use]
+pub fn find_among(scan: &Scan, wanted: &[bool], config: &PatchConfig, seed: u64) -> Vec<Patch> {
+    let kept: Vec<u32> = (0..wanted.len() as u32).filter(|&i| wanted[i as usize]).collect();
+    let mut found = find(&scan.of(&kept), config, seed);
+    for point in found.iter_mut().flat_map(|patch| &mut patch.points) {
+        *point = kept[*point as usize];
+    }
+    found
+}
+
 /// The points that a full neighbourhood of the radius holds: the median over the scan, as borders
 /// hold fewer.
 #[must_use]

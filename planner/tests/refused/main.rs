@@ -4,6 +4,7 @@ mod case;
 mod collisions;
 #[path = "../common/mod.rs"]
 mod common;
+mod keep_out;
 mod pad;
 mod stage;
 
@@ -24,6 +25,7 @@ fn cases(kind: ViolationKind) -> Vec<Case> {
         ViolationKind::Jerk => jerks(),
         ViolationKind::SoftLimit => limits(),
         ViolationKind::Collision => collisions::cases(),
+        ViolationKind::KeepOut => keep_out::cases(),
     }
 }
 
@@ -36,7 +38,8 @@ fn after(kind: ViolationKind) -> Option<ViolationKind> {
         ViolationKind::Acceleration => ViolationKind::Jerk,
         ViolationKind::Jerk => ViolationKind::SoftLimit,
         ViolationKind::SoftLimit => ViolationKind::Collision,
-        ViolationKind::Collision => return None,
+        ViolationKind::Collision => ViolationKind::KeepOut,
+        ViolationKind::KeepOut => return None,
     })
 }
 

@@ -103,6 +103,7 @@ class Scan:
         crop: Optional[Sequence[float]] = None,
         object: Union[None, int, str, Sequence[float]] = None,
         obstacles: Optional[Path] = None,
+        regions: Optional[Path] = None,
     ) -> None: ...
     @staticmethod
     def demo(

@@ -12,6 +12,7 @@ pub mod mutant;
 mod plan;
 mod poses;
 mod recording;
+mod regions;
 mod register;
 mod room;
 mod scan;
@@ -46,6 +47,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "scan", run: scan::run, made: none, mutants: 2000 },
     Target { name: "poses", run: poses::run, made: none, mutants: 5000 },
     Target { name: "tool", run: tool::run, made: tool::made, mutants: 5000 },
+    Target { name: "regions", run: regions::run, made: regions::made, mutants: 5000 },
     Target { name: "gtsp", run: gtsp::run, made: none, mutants: 1000 },
     Target { name: "mesh", run: mesh::run, made: none, mutants: 1000 },
     Target { name: "room", run: room::run, made: room::made, mutants: 50 },

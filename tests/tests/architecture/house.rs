@@ -120,7 +120,7 @@ pub(crate) const STOREYS: &[(&str, Storeys)] = &[
 const BELOW_3: &[&str] = &["progress", "cost", "workcell", "plan", "roadmap", "sweep"];
 #[rustfmt::skip]
 const BELOW_4: &[&str] = &[
-    "progress", "cost", "workcell", "plan", "roadmap", "sweep",
+    "progress", "cost", "regions", "workcell", "plan", "roadmap", "sweep",
     "tour", "motion", "fairing", "timing", "verify", "link",
 ];
 
@@ -142,10 +142,11 @@ const PLANNER: &[(&str, &[&str])] = &[
     // 0
     ("progress", &[]),
     ("cost", &[]),
+    ("regions", &[]),
     // 1
-    ("workcell", &["progress", "cost"]),
+    ("workcell", &["progress", "cost", "regions"]),
     // 2
-    ("plan", &["progress", "cost", "workcell"]),
+    ("plan", &["progress", "cost", "regions", "workcell"]),
     ("roadmap", &["progress", "cost", "workcell", "plan"]),
     // 3: none imports another but sweep; what the search knows is kept from verify
     ("sweep", &["progress", "cost", "workcell", "plan", "roadmap"]),
@@ -153,7 +154,7 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("motion", BELOW_3),
     ("fairing", BELOW_3),
     ("timing", BELOW_3),
-    ("verify", &["progress", "cost", "workcell", "plan", "sweep"]),
+    ("verify", &["progress", "cost", "regions", "workcell", "plan", "sweep"]),
     ("link", BELOW_3),
     // given poses: what those who go through them share
     ("poses", BELOW_4),
@@ -168,13 +169,15 @@ const PLANNER: &[(&str, &[&str])] = &[
 
 #[rustfmt::skip]
 const COLLISION: &[&str] = &[
-    "frame", "rules", "points", "tree", "mesh", "srdf", "error", "options", "obstacle",
-    "solid", "spheres", "sieve", "field", "bodies", "parts", "figure", "shapes", "pairs", "scene",
+    "frame", "rules", "points", "tree", "mesh", "srdf", "error", "options", "solid",
+    "obstacle", "spheres", "sieve", "field", "bodies", "parts", "figure", "shapes", "pairs", "scene",
     "exact", "clearance", "fixed", "moving", "motion", "never", "world", "check", "proof",
 ];
 
-const SURFACE: &[&str] =
-    &["grid", "thin", "fit", "scan", "simulate", "room", "register", "sheet", "patches", "unseen"];
+const SURFACE: &[&str] = &[
+    "grid", "thin", "fit", "scan", "simulate", "change", "room", "register", "sheet", "patches",
+    "unseen",
+];
 
 /// Modules that must not name anything of others: folder of the sources, module, the others.
 pub(crate) const APART: &[(&str, &str, &[&str])] = &[
@@ -217,6 +220,7 @@ pub(crate) const ROOMS: &[(&str, &[&str])] = &[
     ("mcap", &["planner/report", "planner/cli/tests"]),
     ("zenoh", &["relay"]),
     ("plotters", &["planner/experiment"]),
+    ("earcut", &["planner/src/regions"]),
     ("comfy-table", &["planner/cli", "planner/experiment", "tests"]),
 ];
 

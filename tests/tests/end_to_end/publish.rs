@@ -51,6 +51,7 @@ fn plan(arm: &Arm, sketch: &Sketch) -> Plan {
         knots: (0..sketch.knots.len()).map(knot).collect(),
         patches: Vec::new(),
         surface: vec![sample(0.0, true), sample(5.0, false)],
+        regions: Vec::new(),
         continues: None,
         past: Vec::new(),
         left: Vec::new(),

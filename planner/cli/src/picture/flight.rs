@@ -29,7 +29,7 @@ pub(crate) struct Flight {
     /// How many plans ran.
     pub(super) ran: usize,
     /// Measured positions, close enough to say what they sweep.
-    pub(super) swept: Vec<JointVector>,
+    pub(crate) swept: Vec<JointVector>,
     /// The largest deviation of a joint from the setpoint that it answers: which joint, by how much
     /// \[rad or m\], when \[s\]; `None` where no state named a setpoint.
     pub(super) joint: Option<(usize, f64, f64)>,

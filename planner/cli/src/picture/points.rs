@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use nullsweep_planner::plan::{Plan, Stretch};
+use nullsweep_planner::regions::{Kind, Region};
 use nullsweep_planner::sweep::coverage;
 use nullsweep_planner::verify::Verification;
 use nullsweep_planner::workcell::Scene;
@@ -73,6 +74,7 @@ impl Points {
             clouds.push(cloud("around", Paint::Around, scene.surroundings.clone()));
             let unseen = cloud("unseen space", Paint::Unseen, scene.unseen.clone());
             clouds.push(Cloud { shown: false, ..unseen });
+            clouds.extend(regions(scene));
         }
         Self {
             clouds,
@@ -82,6 +84,27 @@ impl Points {
             shares: shares(plan, &swept),
         }
     }
+}
+
+/// The points of each region.
+fn regions(scene: &Scene) -> impl Iterator<Item = Cloud> {
+    let of = |(index, region): (usize, &Region)| Cloud {
+        name: format!("region {}", region.name),
+        paint: Paint::Numbered(index),
+        points: match region.kind {
+            Kind::Sweep(_) => {
+                let points = scene.surface.points.iter();
+                points.filter(|p| region.contains(p)).copied().collect()
+            }
+            Kind::KeepOut => {
+                scene.keep_out.iter().filter(|p| region.contains(p)).copied().collect()
+            }
+            Kind::Avoid => Vec::new(),
+        },
+        shown: false,
+    };
+    let all = scene.regions.all().iter().enumerate().map(of);
+    all.filter(|cloud| !cloud.points.is_empty())
 }
 
 /// Shares of swept points: of those that are reachable, of all; `None`: there are none.

@@ -63,6 +63,7 @@ impl Segment {
                 View {
                     points: kept.iter().map(|&i| view.points[i]).collect(),
                     normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
+                    colours: view.colours.as_ref().map(|c| kept.iter().map(|&i| c[i]).collect()),
                     faces: view.faces.iter().copied().filter(ours).collect(),
                     inside: view.inside.iter().copied().filter(ours).collect(),
                     sensor: view.sensor,

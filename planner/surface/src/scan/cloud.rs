@@ -38,12 +38,18 @@ impl Scan {
     /// The points inside a box, with the box in the scan's own frame.
     #[must_use]
     pub fn cropped(&self, region: &CropBox) -> Self {
-        let kept: Vec<usize> =
-            (0..self.points.len()).filter(|&i| region.contains(&self.points[i])).collect();
+        let inside = |&i: &u32| region.contains(&self.points[i as usize]);
+        let kept: Vec<u32> = (0..self.points.len() as u32).filter(inside).collect();
+        self.of(&kept)
+    }
+
+    /// Some of its points, by their indices.
+    #[must_use]
+    pub fn of(&self, kept: &[u32]) -> Self {
         Self {
-            points: kept.iter().map(|&i| self.points[i]).collect(),
-            normals: kept.iter().map(|&i| self.normals[i]).collect(),
-            raw: kept.iter().map(|&i| self.raw[i]).collect(),
+            points: kept.iter().map(|&i| self.points[i as usize]).collect(),
+            normals: kept.iter().map(|&i| self.normals[i as usize]).collect(),
+            raw: kept.iter().map(|&i| self.raw[i as usize]).collect(),
             spacing: self.spacing,
         }
     }

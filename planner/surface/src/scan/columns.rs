@@ -9,6 +9,7 @@ pub(super) struct Columns {
     /// From each column's unit to the file's.
     pub(super) factors: [f64; 3],
     pub(super) normal: Option<[usize; 3]>,
+    pub(super) colour: Option<[usize; 3]>,
 }
 
 impl Columns {
@@ -16,7 +17,7 @@ impl Columns {
     pub(super) fn in_order(first: usize, normal: bool) -> Self {
         let three = |from| [from, from + 1, from + 2];
         let normal = normal.then(|| three(first + 3));
-        Self { position: three(first), factors: [1.0; 3], normal }
+        Self { position: three(first), factors: [1.0; 3], normal, colour: None }
     }
 
     /// The columns that are named so; `None` where x, y and z are not all among the names.
@@ -46,13 +47,14 @@ impl Columns {
             }
         }
         let factors = factors.map(|factor| factor.unwrap_or(1.0));
-        Some(Self { position, factors, normal: find(NORMAL) })
+        Some(Self { position, factors, normal: find(NORMAL), colour: find(COLOUR) })
     }
 
     /// The same, with a column before the named ones.
     pub(super) fn shifted(self) -> Self {
         let shift = |columns: [usize; 3]| columns.map(|column| column + 1);
-        Self { position: shift(self.position), normal: self.normal.map(shift), ..self }
+        let [normal, colour] = [self.normal, self.colour].map(|columns| columns.map(shift));
+        Self { position: shift(self.position), normal, colour, ..self }
     }
 }
 
@@ -68,6 +70,9 @@ const NORMAL: [&[&str]; 3] = [
     &["ny", "normaly", "normalsy", "normal1", "normals1", "ynormal"],
     &["nz", "normalz", "normalsz", "normal2", "normals2", "znormal"],
 ];
+
+const COLOUR: [&[&str]; 3] =
+    [&["red", "r", "rgb0"], &["green", "g", "rgb1"], &["blue", "b", "rgb2"]];
 
 /// A column's name, in lower-case letters and digits alone, with its unit apart.
 struct Name {

@@ -11,6 +11,7 @@
 
 mod clean;
 mod cloud;
+mod colour;
 mod columns;
 mod crop;
 mod decode;

@@ -11,6 +11,8 @@ pub(super) struct Parsed {
     pub(super) points: Vec<Point3<f64>>,
     /// Parallel to `points`, or empty.
     pub(super) normals: Vec<Vector3<f64>>,
+    /// Red, green and blue, parallel to `points`, or empty.
+    pub(super) colours: Vec<[u8; 3]>,
     /// Corners as indices into `points`; not empty: a mesh.
     pub(super) triangles: Vec<[usize; 3]>,
     /// The sensor's pose by a PCD header, which is not applied.
@@ -25,6 +27,7 @@ impl Default for Parsed {
         Self {
             points: Vec::new(),
             normals: Vec::new(),
+            colours: Vec::new(),
             triangles: Vec::new(),
             viewpoint: None,
             sensor: Some(Point3::origin()),

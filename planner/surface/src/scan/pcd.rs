@@ -5,6 +5,7 @@
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+use super::colour::unpacked;
 use super::decode::{number, without_bom};
 use super::error::{Malformed, Place, malformed};
 use super::parsed::Parsed;
@@ -80,6 +81,8 @@ struct Header {
     position: [usize; 3],
     /// Fields of the normal.
     normal: Option<[usize; 3]>,
+    /// Field of the packed colour: its bits, not the number that they are.
+    colour: Option<usize>,
     /// Bytes of one point.
     record: usize,
     /// Where the body begins. \[byte\]
@@ -175,6 +178,7 @@ impl Header {
         };
         let normal =
             triple("normal_x", "normal_y", "normal_z").or_else(|| triple("nx", "ny", "nz"));
+        let colour = find("rgb").or_else(|| find("rgba")).filter(|&f| fields[f].size == 4);
         let points = Self::points(entries, warnings)?;
         let (data_line, data) = entries.get("DATA")?;
         let encoding = match data.first().map(String::as_str) {
@@ -189,8 +193,21 @@ impl Header {
                 return malformed(data_line, cause);
             }
         };
-        let viewpoint = Self::viewpoint(entries)?;
-        Ok(Self { fields, points, encoding, viewpoint, position, normal, record, body, lines })
+        if let Some(field) = colour.filter(|_| encoding != Encoding::Ascii) {
+            fields[field].kind = Kind::Unsigned;
+        }
+        Ok(Self {
+            fields,
+            points,
+            encoding,
+            viewpoint: Self::viewpoint(entries)?,
+            position,
+            normal,
+            colour,
+            record,
+            body,
+            lines,
+        })
     }
 
     /// POINTS, or WIDTH times HEIGHT; a line that is not there is told where others give it.
@@ -429,4 +446,5 @@ fn push(parsed: &mut Parsed, header: &Header, value: impl Fn(usize) -> f64) {
     if let Some([x, y, z]) = header.normal {
         parsed.normals.push(Vector3::new(value(x), value(y), value(z)));
     }
+    parsed.colours.extend(header.colour.map(|field| unpacked(value(field))));
 }

@@ -57,6 +57,8 @@ pub struct View {
     /// The corners of its meshes and places all over their faces: what is in the way where `points`
     /// are but drawn at random. Empty for points. \[m\]
     pub faces: Vec<Point3<f64>>,
+    /// Red, green and blue that the file gave, parallel to `points`.
+    pub colours: Option<Vec<[u8; 3]>>,
     /// Places inside what its closed meshes enclose. \[m\]
     pub inside: Vec<Point3<f64>>,
     /// Where the sensor stood; `None`: unknown. \[m\]
@@ -107,6 +109,7 @@ pub fn place(raw: &RawScan, placement: &Placement) -> (PlacedScan, Isometry3<f64
             .as_ref()
             .map(|normals| normals.iter().map(|n| pose.rotation * n).collect()),
         faces: raw.faces.iter().map(|p| pose * p).collect(),
+        colours: raw.colours.clone(),
         inside: raw.inside.iter().map(|p| pose * p).collect(),
         sensor,
     };
@@ -172,6 +175,7 @@ fn crop(view: &View, region: &CropBox) -> View {
     View {
         points: kept.iter().map(|&i| view.points[i]).collect(),
         normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
+        colours: view.colours.as_ref().map(|c| kept.iter().map(|&i| c[i]).collect()),
         faces: within(&view.faces),
         inside: within(&view.inside),
         sensor: view.sensor,

@@ -8,6 +8,7 @@ use ply_rs_bw::ply::{
     Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
+use super::colour::of_columns;
 use super::decode::{decode, without_bom};
 use super::error::{Malformed, Place, malformed};
 use super::parsed::Parsed;
@@ -40,10 +41,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
         Encoding::Ascii => decode(&bytes[body..], &mut parsed.warnings)?,
         _ => "".into(),
     };
+    let mut colours = Vec::new();
     let mut lines = Body::new(&text, lines_before);
     for (name, definition) in &header.elements {
         let has = |names: [&str; 3]| names.iter().all(|n| definition.properties.contains_key(*n));
         let normal = has(["nx", "ny", "nz"]) || has(["normal_x", "normal_y", "normal_z"]);
+        let colour = has(["red", "green", "blue"]);
         for _ in 0..definition.count {
             let place = Place::Byte(bytes.len() - source.len());
             let binary = |e: ParseError| Malformed { place, cause: one_line(&e) };
@@ -62,12 +65,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
                     if normal {
                         parsed.normals.push(Vector3::from(record.normal));
                     }
+                    if colour {
+                        colours.push(record.colour);
+                    }
                 }
                 "face" => fan(&record.corners, &mut parsed.triangles),
                 _ => {}
             }
         }
     }
+    parsed.colours = of_columns(&colours);
     if let Some(place) = lines.broken {
         parsed.warnings.push(ScanWarning::BrokenLines { place });
     }
@@ -105,12 +112,14 @@ fn header_end(bytes: &[u8]) -> Option<usize> {
 struct Record {
     position: [f64; 3],
     normal: [f64; 3],
+    colour: [f64; 3],
     corners: Vec<u32>,
 }
 
 impl PropertyAccess for Record {
     fn new() -> Self {
-        Self { position: [f64::NAN; 3], normal: [0.0; 3], corners: Vec::new() }
+        let (position, normal, colour) = ([f64::NAN; 3], [0.0; 3], [0.0; 3]);
+        Self { position, normal, colour, corners: Vec::new() }
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
@@ -121,6 +130,9 @@ impl PropertyAccess for Record {
             "nx" | "normal_x" => &mut self.normal[0],
             "ny" | "normal_y" => &mut self.normal[1],
             "nz" | "normal_z" => &mut self.normal[2],
+            "red" => &mut self.colour[0],
+            "green" => &mut self.colour[1],
+            "blue" => &mut self.colour[2],
             "vertex_indices" | "vertex_index" => {
                 return match property.to_u32_list() {
                     Some(corners) => {

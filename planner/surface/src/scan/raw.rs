@@ -15,6 +15,8 @@ pub struct RawScan {
     pub normals: Option<Vec<UnitVector3<f64>>>,
     /// A mesh's corners and places all over its faces; empty for points. \[m\]
     pub faces: Vec<Point3<f64>>,
+    /// Red, green and blue parallel to `points`, where the file has them.
+    pub colours: Option<Vec<[u8; 3]>>,
     /// Places inside what closed meshes enclose, on a grid. \[m\]
     pub inside: Vec<Point3<f64>>,
     /// Pose of the sensor in the frame of the points, where a PCD header states other than the
@@ -41,6 +43,7 @@ impl Default for RawScan {
             vertices: Vec::new(),
             normals: None,
             faces: Vec::new(),
+            colours: None,
             inside: Vec::new(),
             viewpoint: None,
             sensor: Some(Point3::origin()),

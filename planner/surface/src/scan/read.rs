@@ -148,8 +148,8 @@ pub fn read_bytes(
 }
 
 fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan, ScanError> {
-    let Parsed { mut points, mut normals, triangles, mut viewpoint, mut sensor, mut warnings } =
-        parsed;
+    let Parsed { mut points, mut normals, mut colours, triangles, .. } = parsed;
+    let Parsed { mut viewpoint, mut sensor, mut warnings, .. } = parsed;
     let scale = scale(options.scale, &mut warnings);
     for p in &mut points {
         p.coords *= scale;
@@ -172,12 +172,21 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
         corners.for_each(|&corner| used[corner] = true);
         vertices = points;
         on_faces = faces::places(&vertices, &wound, options.mesh_spacing);
+        colours.clear();
         (points, normals, dropped) =
             sample::sample(&vertices, &wound, options.mesh_spacing, options.seed, &mut warnings);
         let mut used = used.into_iter();
         vertices.retain(|p| used.next() == Some(true) && p.iter().all(|c| c.is_finite()));
     }
     let finite: Vec<bool> = points.iter().map(|p| p.coords.iter().all(|c| c.is_finite())).collect();
+    let mut keep =
+        |points: &mut Vec<Point3<f64>>, normals: &mut Vec<Vector3<f64>>, flags: &[bool]| {
+            retain(&mut colours, flags);
+            retain(normals, flags);
+            let before = points.len();
+            retain(points, flags);
+            before - points.len()
+        };
     dropped += keep(&mut points, &mut normals, &finite);
 
     let zero = |p: &Point3<f64>| p.coords.iter().all(|c| *c == 0.0);
@@ -218,11 +227,14 @@ fn finish(parsed: Parsed, path: &Path, options: &ReadOptions) -> Result<RawScan,
     let normals = (normals.len() == points.len())
         .then(|| normals.into_iter().map(unit).collect::<Option<Vec<_>>>())
         .flatten();
+    let colours = Some(colours).filter(|colours| colours.len() == points.len());
+    let faces = on_faces;
     Ok(RawScan {
         points,
         vertices,
         normals,
-        faces: on_faces,
+        colours,
+        faces,
         inside,
         viewpoint,
         sensor,
@@ -250,16 +262,12 @@ fn scale(asked: f64, warnings: &mut Vec<ScanWarning>) -> f64 {
     asked / factor
 }
 
-/// Keeps what is flagged of the points and their normals; returns how many points went.
-fn keep(points: &mut Vec<Point3<f64>>, normals: &mut Vec<Vector3<f64>>, flags: &[bool]) -> usize {
-    let before = points.len();
-    if normals.len() == before {
+/// Keeps what is flagged of a list that runs parallel to the flags; any other stays as it is.
+fn retain<T>(list: &mut Vec<T>, flags: &[bool]) {
+    if list.len() == flags.len() {
         let mut flag = flags.iter();
-        normals.retain(|_| *flag.next().unwrap_or(&false));
+        list.retain(|_| *flag.next().unwrap_or(&false));
     }
-    let mut flag = flags.iter();
-    points.retain(|_| *flag.next().unwrap_or(&false));
-    before - points.len()
 }
 
 /// The longest side of the bounding box.

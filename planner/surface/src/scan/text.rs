@@ -3,6 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::colour::of_columns;
 use super::columns::Columns;
 use super::decode::decode;
 use super::error::{Malformed, Place, malformed};
@@ -21,7 +22,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
     let mut parsed = Parsed::default();
     let content = decode(bytes, &mut parsed.warnings)?;
     let Some(table) = Table::learn(&content, &mut parsed.warnings)? else { return Ok(parsed) };
-    let mut cells = Vec::new();
+    let (mut cells, mut colours) = (Vec::new(), Vec::new());
     for (index, line) in content.lines().enumerate().skip(table.from) {
         if line.trim().is_empty() || is_comment(line) || Some(line) == table.heading {
             continue;
@@ -30,8 +31,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Malformed> {
         if table.announced.is_some() && is_count(&cells) {
             continue;
         }
-        table.row(&cells, Place::Line(index + 1), &mut parsed)?;
+        table.row(&cells, Place::Line(index + 1), &mut parsed, &mut colours)?;
     }
+    parsed.colours = of_columns(&colours);
     if let Some(announced) = table.announced.filter(|&n| n != parsed.points.len()) {
         let found = parsed.points.len();
         parsed.warnings.push(ScanWarning::CountDiffers { announced, found });
@@ -192,8 +194,14 @@ impl<'a> Table<'a> {
     }
 
     /// Adds a row's point.
-    fn row(&self, cells: &[&str], place: Place, parsed: &mut Parsed) -> Result<(), Malformed> {
-        let Columns { position, factors, normal } = self.columns;
+    fn row(
+        &self,
+        cells: &[&str],
+        place: Place,
+        parsed: &mut Parsed,
+        colours: &mut Vec<[f64; 3]>,
+    ) -> Result<(), Malformed> {
+        let Columns { position, factors, normal, colour } = self.columns;
         let last = position[0].max(position[1]).max(position[2]);
         // Between blanks an empty cell cannot be seen, so all behind it may have moved up.
         let needed = if self.cells.are_blank() { self.width.max(last + 1) } else { last + 1 };
@@ -214,6 +222,10 @@ impl<'a> Table<'a> {
         if let Some([x, y, z]) = normal {
             parsed.normals.push(Vector3::new(value(x)?, value(y)?, value(z)?));
         }
+        if let Some(rgb) = colour {
+            // What is no number there does not spoil the point.
+            colours.push(rgb.map(|column| value(column).unwrap_or(f64::NAN)));
+        }
         Ok(())
     }
 
@@ -229,7 +241,8 @@ impl<'a> Table<'a> {
         } else if are_directions(&parsed.normals) {
             Rest::Normals
         } else {
-            parsed.normals = Vec::new();
+            let rgb = std::mem::take(&mut parsed.normals);
+            parsed.colours = of_columns(&rgb.into_iter().map(Into::into).collect::<Vec<_>>());
             Rest::Colour
         };
         parsed.warnings.push(ScanWarning::Unnamed { first: first + 1, rest });
