@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use clap::{Arg, Args, Command};
 use nullsweep_ipc_types::Reason;
 use nullsweep_planner::link::publish::{Join, PublishError};
-use nullsweep_planner::plan::Plan;
+use nullsweep_planner::plan::{Plan, PlanError, Program};
 use nullsweep_robot::Arm;
 
 use crate::bars::Bars;
 use crate::choices::JoinArg;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::output::{complain, say, say_on};
+use crate::publish_program::{self, ProgramArgs};
 use crate::robot::{RobotArgs, differs};
 use crate::send::{SendArgs, interruption, outlook, resting};
 use crate::site::SiteArgs;
@@ -20,35 +21,47 @@ use crate::way::{Broken, Found, Way, WayArgs};
 #[derive(Debug, Args)]
 #[command(mut_args(only_with_goto))]
 pub(super) struct PublishArgs {
-    /// The plan file.
-    plan: PathBuf,
-    /// With --goto: the scans that the plan was made for, given as they were to `plan`.
-    #[arg(requires = "goto")]
-    scans: Vec<PathBuf>,
+    /// The plan file, or the program of `planner plan --stops`.
+    pub(super) plan: PathBuf,
+    /// With --goto or --resume: the scans that the plan was made for, given as they were to `plan`.
+    #[arg(requires = SEEN)]
+    pub(super) scans: Vec<PathBuf>,
     /// Bring the arm to the plan's start first, free of collision, as `planner goto` does.
-    #[arg(long)]
+    #[arg(long, group = SEEN)]
     goto: bool,
     /// How it joins what is going on; without it at its knot for a plan that continues another
     /// one, else after a stop.
     #[arg(long, value_enum)]
-    join: Option<JoinArg>,
+    pub(super) join: Option<JoinArg>,
     /// Wait for the plan's end as well, and show how far it is.
     #[arg(long)]
     wait: bool,
     /// Send a plan that was not verified, or that was changed since.
     #[arg(long)]
-    unverified: bool,
+    pub(super) unverified: bool,
     #[command(flatten)]
-    send: SendArgs,
+    pub(super) send: SendArgs,
     #[command(flatten)]
-    site: SiteArgs,
-    #[command(flatten, next_help_heading = "The robot, and what is around it with --goto")]
-    robot: RobotArgs,
+    pub(super) site: SiteArgs,
+    #[command(flatten, next_help_heading = "Of a program")]
+    pub(super) program: ProgramArgs,
+    #[command(
+        flatten,
+        next_help_heading = "The robot, and what is around it with --goto or --resume"
+    )]
+    pub(super) robot: RobotArgs,
     #[command(flatten)]
-    way: WayArgs,
+    pub(super) way: WayArgs,
 }
 
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
+    match Program::read(&args.plan) {
+        Ok(Some(program)) => return publish_program::run(args, &program),
+        // A plan's reader says more of a file that is none.
+        Ok(None) | Err(PlanError::File { .. }) => {}
+        Err(error) => return Err(error.into()),
+    }
+    args.program.of_a_plan()?;
     let plan = Plan::read(&args.plan)?;
     match plan.check_seal() {
         Err(error) if args.unverified => complain!("planner: warning: {error}; it is sent anyway"),
@@ -94,11 +107,14 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     Ok(OK)
 }
 
+/// Flags by which it matters what is around the arm.
+const SEEN: &str = "seen";
+
 /// What says how the way to the start is planned says nothing without one.
 fn only_with_goto(arg: Arg) -> Arg {
     let way = WayArgs::augment_args(Command::new("way"));
     let is_ways = way.get_arguments().any(|of_way| of_way.get_id() == arg.get_id());
-    if is_ways { arg.requires("goto") } else { arg }
+    if is_ways { arg.requires(SEEN) } else { arg }
 }
 
 impl PublishArgs {
