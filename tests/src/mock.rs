@@ -62,23 +62,21 @@ struct Args {
     /// With --program: where the base stands at first, x,y,yaw in m and rad
     #[arg(
         long,
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true,
+        value_parser = place,
+        allow_hyphen_values = true,
         value_name = "X,Y,YAW",
         requires = "program"
     )]
-    stands: Vec<f64>,
+    stands: Option<[f64; 3]>,
     /// With --program: how far off its goal the base ends each drive, x,y,yaw in m and rad
     #[arg(
         long,
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true,
+        value_parser = place,
+        allow_hyphen_values = true,
         value_name = "X,Y,YAW",
         requires = "program"
     )]
-    base_off: Vec<f64>,
+    base_off: Option<[f64; 3]>,
     /// Where the joints stand at first, base to tip; without it, the arm's home, in rad
     #[arg(
         long,
@@ -170,6 +168,14 @@ fn ending() -> anyhow::Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
+fn place(text: &str) -> Result<[f64; 3], String> {
+    let values: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    let values = values.map_err(|e| format!("{e}: x,y,yaw is wanted"))?;
+    let finite = values.iter().all(|value| value.is_finite());
+    let three = values.try_into().map_err(|_| "three numbers are wanted: x,y,yaw".to_owned())?;
+    if finite { Ok(three) } else { Err("finite numbers are wanted".into()) }
+}
+
 fn behaviour(args: &Args) -> Behaviour {
     let session_timeout_ns = args.timeout.saturating_mul(1_000_000);
     Behaviour {
@@ -183,15 +189,14 @@ fn behaviour(args: &Args) -> Behaviour {
 
 /// Is the whole robot; how many violations there were.
 fn run_whole(args: &Args, program: &Path) -> anyhow::Result<u64> {
-    let three = |values: &[f64]| values.try_into().unwrap_or([0.0; 3]);
     let config = whole::Config {
         program: program.into(),
         robot: args.arm.robot()?,
         robot_name: args.arm.robot_name.clone(),
         ipc_root: args.arm.ipc_root.clone(),
         posts: args.executor.clone(),
-        base: three(&args.stands),
-        off: three(&args.base_off),
+        base: args.stands.unwrap_or_default(),
+        off: args.base_off.unwrap_or_default(),
         behaviour: behaviour(args),
         every_ns: args.record_every.max(1) * 1_000_000,
         priority: args.priority,
