@@ -5,6 +5,7 @@
 //!   states out), a [`plant`] (a joint [`servo`], or the PR2's [`mechanism`]), the [`judge`] of
 //!   every setpoint, and [`fault`]s on request.
 //! * [`whole`]: a simulated robot with several arms on a [`base`] that drives.
+//!   [`crew`]: it, its executors, and who works through a program.
 //! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all;
 //!   [`system`]: mock and executor on a stage, from their start to the verdict.
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
@@ -17,6 +18,7 @@ pub mod arm_args;
 pub mod base;
 pub mod clock;
 pub mod conformance;
+pub mod crew;
 pub mod demo;
 pub mod endpoint;
 pub mod fault;

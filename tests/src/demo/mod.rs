@@ -5,6 +5,7 @@ mod args;
 mod hardware;
 mod outcome;
 mod table;
+mod whole;
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -15,6 +16,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
 use nullsweep_planner::plan::Plan;
+use serde::Serialize;
 
 use crate::latency::of_buckets;
 use crate::parts;
@@ -39,8 +41,13 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(args) => args,
         Err(code) => return code,
     };
-    match run(&args) {
-        Ok(outcome) if outcome.checks.iter().all(|c| c.ok) => ExitCode::SUCCESS,
+    let checks = if args.whole {
+        run(&args, whole::perform, whole::text).map(|outcome| outcome.checks)
+    } else {
+        run(&args, perform, table::text).map(|outcome| outcome.checks)
+    };
+    match checks {
+        Ok(checks) if checks.iter().all(|c| c.ok) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
             eprintln!("demo: {error:#}");
@@ -49,7 +56,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-fn run(args: &Args) -> anyhow::Result<Outcome> {
+fn run<O: Serialize>(
+    args: &Args,
+    perform: fn(&Args, &Stage) -> anyhow::Result<O>,
+    text: fn(&O) -> String,
+) -> anyhow::Result<O> {
     args.hardware.check(args)?;
     let outcome = Stage::with(args.keep.as_deref(), |stage| perform(args, stage))?;
     match &args.json {
@@ -60,9 +71,9 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
             let file = File::create(path)
                 .with_context(|| format!("cannot write the figures to {}", path.display()))?;
             serde_json::to_writer_pretty(file, &outcome)?;
-            println!("{}", table::text(&outcome));
+            println!("{}", text(&outcome));
         }
-        None => println!("{}", table::text(&outcome)),
+        None => println!("{}", text(&outcome)),
     }
     Ok(outcome)
 }
