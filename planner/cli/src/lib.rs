@@ -29,6 +29,8 @@ mod plan_command;
 mod posture;
 mod posture_arg;
 mod program;
+mod program_args;
+mod program_report;
 mod publish;
 mod publish_program;
 mod refusal;

@@ -12,7 +12,8 @@ use crate::bars::Bars;
 use crate::choices::JoinArg;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::output::{complain, say, say_on};
-use crate::publish_program::{self, ProgramArgs};
+use crate::program_args::{Asked, ProgramArgs};
+use crate::publish_program;
 use crate::robot::{RobotArgs, differs};
 use crate::send::{SendArgs, interruption, outlook, resting};
 use crate::site::SiteArgs;
@@ -22,41 +23,41 @@ use crate::way::{Broken, Found, Way, WayArgs};
 #[command(mut_args(only_with_goto))]
 pub(super) struct PublishArgs {
     /// The plan file, or the program of `planner plan --stops`.
-    pub(super) plan: PathBuf,
+    plan: PathBuf,
     /// With --goto or --resume: the scans that the plan was made for, given as they were to `plan`.
     #[arg(requires = SEEN)]
-    pub(super) scans: Vec<PathBuf>,
+    scans: Vec<PathBuf>,
     /// Bring the arm to the plan's start first, free of collision, as `planner goto` does.
     #[arg(long, group = SEEN)]
     goto: bool,
     /// How it joins what is going on; without it at its knot for a plan that continues another
     /// one, else after a stop.
     #[arg(long, value_enum)]
-    pub(super) join: Option<JoinArg>,
+    join: Option<JoinArg>,
     /// Wait for the plan's end as well, and show how far it is.
     #[arg(long)]
     wait: bool,
     /// Send a plan that was not verified, or that was changed since.
     #[arg(long)]
-    pub(super) unverified: bool,
+    unverified: bool,
     #[command(flatten)]
-    pub(super) send: SendArgs,
+    send: SendArgs,
     #[command(flatten)]
-    pub(super) site: SiteArgs,
+    site: SiteArgs,
     #[command(flatten, next_help_heading = "Of a program")]
-    pub(super) program: ProgramArgs,
+    program: ProgramArgs,
     #[command(
         flatten,
         next_help_heading = "The robot, and what is around it with --goto or --resume"
     )]
-    pub(super) robot: RobotArgs,
+    robot: RobotArgs,
     #[command(flatten)]
-    pub(super) way: WayArgs,
+    way: WayArgs,
 }
 
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     match Program::read(&args.plan) {
-        Ok(Some(program)) => return publish_program::run(args, &program),
+        Ok(Some(program)) => return publish_program::run(args.of_program()?, &program),
         // A plan's reader says more of a file that is none.
         Ok(None) | Err(PlanError::File { .. }) => {}
         Err(error) => return Err(error.into()),
@@ -118,6 +119,15 @@ fn only_with_goto(arg: Arg) -> Arg {
 }
 
 impl PublishArgs {
+    /// What they say of a program.
+    fn of_program(&self) -> Result<Asked<'_>, Usage> {
+        if self.join.is_some() {
+            return Err(Usage("--join is for plans: those of a program begin at rest".into()));
+        }
+        let Self { plan, scans, unverified, program, send, site, robot, way, .. } = self;
+        Ok(Asked { file: plan, scans, unverified: *unverified, program, send, site, robot, way })
+    }
+
     /// The plan's arm, where the arguments name it: who sends a plan need not say which robot it is of.
     fn arm_of(&self, plan: &Plan) -> Option<Arm> {
         let held: Vec<_> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();

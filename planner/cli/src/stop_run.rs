@@ -6,12 +6,12 @@ use std::time::{Duration, Instant};
 use anyhow::Context;
 use nullsweep_ipc_types::ports::Ipc;
 use nullsweep_ipc_types::{EventKind, PlanEvent};
-use nullsweep_planner::link::base::{Mover, Stands};
+use nullsweep_planner::link::base::{Mover, Stands, displacement};
 use nullsweep_planner::link::journal::{Begun, Journal, Progress};
 use nullsweep_planner::link::left_at;
 use nullsweep_planner::link::posture::{Posture, posture};
 use nullsweep_planner::link::publish::{Join, PublishError, newest_telemetry};
-use nullsweep_planner::plan::{Plan, Program, Work};
+use nullsweep_planner::plan::{Plan, PlanError, Program, ProgramStop, Work};
 use nullsweep_planner::stops::{LeftOff, Rest, rest};
 use nullsweep_planner::workcell::stance::told;
 use nullsweep_planner::workcell::{Scene, Stance};
@@ -19,10 +19,9 @@ use nullsweep_robot::{Arm, JointVector, Robot};
 
 use crate::bars::Bars;
 use crate::output::tell;
-use crate::publish::PublishArgs;
-use crate::publish_program::{
-    Limb, Outcome, Report, Step, Stood, arm_of, off_place, place, rest_file, site, tip,
-};
+use crate::program::{place, tip};
+use crate::program_args::{Asked, Limb, arm_of};
+use crate::program_report::{Outcome, Report, Step, Stood};
 use crate::send::{BRIDGED, HeldElsewhere, LISTEN, Stopped, apart, held_apart};
 use crate::way::Way;
 
@@ -31,7 +30,7 @@ const SETTLE: Duration = Duration::from_secs(3);
 
 /// A program on its way.
 pub(super) struct Run<'a> {
-    pub(super) args: &'a PublishArgs,
+    pub(super) asked: Asked<'a>,
     pub(super) program: &'a Program,
     pub(super) robot: Robot,
     pub(super) limbs: Vec<Limb>,
@@ -77,6 +76,9 @@ impl Run<'_> {
     /// Works through all that is not done.
     pub(super) fn all(&mut self) -> anyhow::Result<()> {
         let program = self.program;
+        if self.asked.program.resume {
+            self.await_begun()?;
+        }
         for (s, stop) in program.stops.iter().enumerate() {
             let works = 0..stop.works.len();
             let is_done = |w: usize| self.journal.progress((s, w)) == Progress::Finished;
@@ -84,16 +86,55 @@ impl Run<'_> {
                 continue;
             }
             let at = format!("stop {}", s + 1);
-            let here = Within { at, program: self.args.plan.clone() };
+            let here = Within { at, program: self.asked.file.into() };
             self.stand(s).context(here)?;
             for w in works {
                 let work = &stop.works[w];
                 let at = format!("stop {}, plan {} ({})", s + 1, w + 1, tip(work));
-                let here = Within { at, program: self.args.plan.clone() };
+                let here = Within { at, program: self.asked.file.into() };
                 self.work((s, w), work).context(here)?;
             }
         }
         Ok(())
+    }
+
+    /// Waits for plans that run, and keeps what has come to its end while nobody waited for it.
+    fn await_begun(&mut self) -> anyhow::Result<()> {
+        let program = self.program;
+        for (s, stop) in program.stops.iter().enumerate() {
+            for (w, work) in stop.works.iter().enumerate() {
+                let here = format!("stop {}, plan {} ({})", s + 1, w + 1, tip(work));
+                let begun = match self.journal.progress((s, w)) {
+                    Progress::Finished => continue,
+                    Progress::Begun(begun) => Some(begun),
+                    Progress::Open => self.unwritten((s, w), work)?,
+                };
+                let Some(begun) = begun else { continue };
+                let read = begun.file.as_deref().map(rest_file).transpose()?;
+                let plan = read.as_ref().unwrap_or(&work.plan);
+                tell!("{here} was begun: asking what became of it");
+                let site = self.limb(work)?.site(self.asked);
+                let fate = self.asked.send.fate(begun.id, plan, site)?;
+                if fate.as_ref().is_some_and(|event| event.kind == EventKind::Finished.wire()) {
+                    self.journal.finished((s, w))?;
+                    self.note((s, w), work, Outcome::FoundFinished);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A plan that runs and was sent by a process that died before it could write so.
+    fn unwritten(&mut self, at: (usize, usize), work: &Work) -> anyhow::Result<Option<Begun>> {
+        let site = self.limb(work)?.site(self.asked);
+        let now = newest_telemetry(&Ipc::open(site.robot, site.root)?, LISTEN)?;
+        let runs =
+            now.plan.is_some() && left_at(&work.plan, &now, Some(now.knot as usize)).is_some();
+        if !runs {
+            return Ok(None);
+        }
+        self.journal.begun(at, now.plan, None)?;
+        Ok(Some(Begun { id: now.plan, file: None, knot: None }))
     }
 
     /// Has the base stand at a stop, its joints set.
@@ -102,7 +143,7 @@ impl Run<'_> {
         let mover = match self.mover.take() {
             Some(mover) => mover,
             None => {
-                let site = self.args.site.site();
+                let site = self.asked.site.site();
                 Mover::find(&Ipc::open(site.robot, site.root)?)?
             }
         };
@@ -112,7 +153,7 @@ impl Run<'_> {
             Mover::Driver(_) => mover.stands()?,
             Mover::Person(_) => before,
         };
-        let bound = self.args.program.base_off;
+        let bound = self.asked.program.base_off;
         let there = now.filter(|now| off_place(stop, now.pose) <= bound);
         if let Some(stands) = there
             && self.held_off(s)?.is_empty()
@@ -133,7 +174,7 @@ impl Run<'_> {
         tell!("stop {of} of {count}: the base to {at}");
         let Some(mover) = &self.mover else { return Ok(()) };
         if matches!(mover, Mover::Person(_)) {
-            let robot = self.args.site.site().robot;
+            let robot = self.asked.site.site().robot;
             tell!(
                 "nothing answers that drives the base of robot `{robot}`: drive it there, set its joints, then \
                  `executor ctl arrived`"
@@ -155,7 +196,7 @@ impl Run<'_> {
             drove,
             off_m: off,
         });
-        let bound = self.args.program.base_off;
+        let bound = self.asked.program.base_off;
         if off > bound {
             return Err(Off { stands: stands.pose, off, bound }.into());
         }
@@ -215,7 +256,7 @@ impl Run<'_> {
     fn posture(&self, work: &Work, plan: &Plan) -> anyhow::Result<(Arm, Posture)> {
         let limb = self.limb(work)?;
         let arm = arm_of(&self.robot, &limb.spec, plan)?;
-        let now = posture(site(self.args, limb), &arm, LISTEN);
+        let now = posture(limb.site(self.asked), &arm, LISTEN);
         let now = now.with_context(|| format!("executor `{}`", limb.name))?;
         Ok((arm, now))
     }
@@ -231,18 +272,6 @@ impl Run<'_> {
             Progress::Finished => return Ok(()),
             Progress::Begun(begun) => return self.go_on(at, work, &begun),
             Progress::Open => {}
-        }
-        // A plan that was sent by a process that died before it could write so.
-        let limb = self.limb(work)?;
-        let site = site(self.args, limb);
-        let now = newest_telemetry(&Ipc::open(site.robot, site.root)?, LISTEN)?;
-        if self.args.program.resume
-            && now.plan.is_some()
-            && left_at(&work.plan, &now, Some(now.knot as usize)).is_some()
-        {
-            self.journal.begun(at, now.plan, None)?;
-            let begun = Begun { id: now.plan, file: None, knot: None };
-            return self.go_on(at, work, &begun);
         }
         self.begin(at, work, Outcome::Finished)
     }
@@ -260,15 +289,9 @@ impl Run<'_> {
     fn go_on(&mut self, at: (usize, usize), work: &Work, begun: &Begun) -> anyhow::Result<()> {
         let read = begun.file.as_deref().map(rest_file).transpose()?;
         let plan = read.as_ref().unwrap_or(&work.plan);
-        let limb = self.limb(work)?;
-        let site = site(self.args, limb);
-        let fate = self.args.send.fate(begun.id, plan, site)?;
-        let finished = |event: &PlanEvent| event.kind == EventKind::Finished.wire();
-        if fate.as_ref().is_some_and(finished) {
-            self.journal.finished(at)?;
-            self.note(at, work, Outcome::FoundFinished);
-            return Ok(());
-        }
+        let site = self.limb(work)?.site(self.asked);
+        // That it has not come to its end is known by now.
+        let fate = self.asked.send.fate(begun.id, plan, site)?;
         let (_, rests) = self.posture(work, plan)?;
         let now = newest_telemetry(&Ipc::open(site.robot, site.root)?, LISTEN)?;
         let ended = fate.and_then(|event| (event.knot != u32::MAX).then_some(event.knot as usize));
@@ -287,7 +310,7 @@ impl Run<'_> {
             plan.knots.len()
         );
         let left = LeftOff { program: self.program, work, plan, knot, at: rests.q };
-        match rest(&self.robot, scene, left, self.args.robot.collision()) {
+        match rest(&self.robot, scene, left, self.asked.robot.collision()) {
             Ok(Rest::Plan(made, notes)) => {
                 notes.iter().for_each(|note| tell!("note: {note}"));
                 let file = self.write(at, &made)?;
@@ -328,8 +351,8 @@ impl Run<'_> {
         let to = plan.knots.first().map_or(JointVector::ZERO, |knot| knot.q);
         let held = plan.held.iter().map(|h| (h.name.clone(), h.position)).collect();
         let way = Way {
-            robot: &self.args.robot.with_arm(limb.spec.clone()),
-            site: site(self.args, limb),
+            robot: &self.asked.robot.with_arm(limb.spec.clone()),
+            site: limb.site(self.asked),
             scans: &[],
             stance: Stance { base: plan.base, height: plan.base_height, held },
             tool: plan.tool.clone(),
@@ -337,12 +360,12 @@ impl Run<'_> {
         };
         let [x, y, _] = plan.base;
         let (here, _) = scene.near([x, y], self.program.near_m);
-        let Some(found) = self.args.way.find_in(&way, &here, to, &Bars::new())? else {
+        let Some(found) = self.asked.way.find_in(&way, &here, to, &Bars::new())? else {
             return Ok(());
         };
         tell!("{} to where its plan begins, {:.1} s", tip(work), found.plan.duration());
         let arm = way.arm()?;
-        self.args.send.send((&found.plan, None), Some(&arm), way.site, Join::Stop, true)
+        self.asked.send.send((&found.plan, None), Some(&arm), way.site, Join::Stop, true)
     }
 
     /// Sends a plan, waits for its end, and keeps what became of it.
@@ -358,15 +381,15 @@ impl Run<'_> {
         tell!("plan {done} of {of}: stop {s}, plan {w}, {}, {:.1} s", tip(work), plan.duration());
         let limb = self.limb(work)?.clone();
         let arm = arm_of(&self.robot, &limb.spec, plan)?;
-        let (args, journal) = (self.args, &mut self.journal);
+        let (asked, journal) = (self.asked, &mut self.journal);
         let mut begun = None;
         let mut told = |event: &PlanEvent| {
             if event.kind == EventKind::Accepted.wire() {
                 begun = Some(journal.begun(at, event.plan, file));
             }
         };
-        let to = (Some(&arm), site(args, &limb));
-        let sent = args.send.send_told((plan, None), to, Join::Stop, true, &mut told);
+        let to = (Some(&arm), limb.site(asked));
+        let sent = asked.send.send_told((plan, None), to, Join::Stop, true, &mut told);
         let taken = begun.transpose()?.is_some();
         match sent {
             Ok(()) => {
@@ -402,4 +425,16 @@ fn knot_of(error: &anyhow::Error) -> Option<usize> {
         }
         _ => None,
     }
+}
+
+/// How far what the plans of a stop are to sweep lies from where they have it, the most of all. \[m\]
+fn off_place(stop: &ProgramStop, stands: [f64; 3]) -> f64 {
+    stop.works.iter().map(|work| displacement(&work.plan, stands)).fold(0.0, f64::max)
+}
+
+/// A plan that was written beside the journal, if it is as it was verified.
+fn rest_file(file: &Path) -> Result<Plan, PlanError> {
+    let plan = Plan::read(file)?;
+    plan.check_seal()?;
+    Ok(plan)
 }

@@ -198,10 +198,13 @@ fn confirmed(server: &BaseServer, goal: &BaseCommand) -> Result<Stands, BaseErro
 }
 
 /// How far, at most, what a plan can reach of its surface lies from where the plan has it, with the base
-/// where it stands. \[m\]
+/// where it stands; without end where that is no place. \[m\]
 #[must_use]
 pub fn displacement(plan: &Plan, stands: [f64; 3]) -> f64 {
     let [x, y, yaw] = stands;
+    if stands.iter().any(|value| !value.is_finite()) {
+        return f64::INFINITY;
+    }
     let here = Isometry3::new(Vector3::new(x, y, plan.base_height), Vector3::z() * yaw);
     let moved = here.inverse() * plan.base_pose();
     let apart = |p: &[f64; 3]| (moved * Point3::from(*p) - Point3::from(*p)).norm();
@@ -214,9 +217,11 @@ mod tests {
     use std::time::Instant;
 
     use bytemuck::Zeroable;
+    use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
     use tempfile::TempDir;
 
     use super::*;
+    use crate::plan::SurfaceSample;
 
     fn stop() -> ProgramStop {
         ProgramStop {
@@ -320,6 +325,27 @@ mod tests {
             let stands = mover.drive(&stop(), &mut |_| ()).expect("it is said");
             assert_eq!(stands, Stands { pose: [1.0, 2.0, 0.5], measured: false });
         });
+    }
+
+    #[test]
+    fn how_far_the_surface_lies_off_comes_of_the_place_and_the_turn() {
+        let robot = Robot::pr2();
+        let arm = robot.arm(&ArmSpec::pr2(Side::Right)).expect("the PR2 has a right arm");
+        let plan = Plan::of(&robot, &arm, &Tool::default(), Vec::new());
+        let sample = |x: f64, reachable| SurfaceSample {
+            point: [x, 0.0, 0.5],
+            normal: [0.0, 0.0, 1.0],
+            reachable,
+        };
+        let surface = vec![sample(1.0, true), sample(3.0, false)];
+        let plan = Plan { base: [2.0, 1.0, 0.3], surface, ..plan };
+        assert!(displacement(&plan, [2.0, 1.0, 0.3]) < 1e-12);
+        assert!((displacement(&plan, [2.0, 1.01, 0.3]) - 0.01).abs() < 1e-12);
+        // Of what it can reach, 1 m away.
+        assert!((displacement(&plan, [2.0, 1.0, 0.32]) - 0.02).abs() < 1e-5);
+        for nowhere in [[f64::NAN, 1.0, 0.3], [2.0, 1.0, f64::INFINITY]] {
+            assert_eq!(displacement(&plan, nowhere), f64::INFINITY);
+        }
     }
 
     #[test]
