@@ -20,8 +20,8 @@ use nullsweep_surface::register::RegisterError;
 use nullsweep_surface::room::LevelError;
 use nullsweep_surface::scan::ScanWarning;
 
+use crate::program_error::{Astray, Off, Within};
 use crate::send::{Elsewhere, HeldElsewhere, Stopped};
-use crate::stop_run::{Astray, Off, Within};
 
 /// A line of advice for an error, where a flag can help: that of the outermost cause with any.
 pub(super) fn advice(error: &anyhow::Error) -> Option<String> {

@@ -30,6 +30,7 @@ mod posture;
 mod posture_arg;
 mod program;
 mod program_args;
+mod program_error;
 mod program_report;
 mod publish;
 mod publish_program;

@@ -13,7 +13,6 @@ use nullsweep_planner::link::posture::{Posture, posture};
 use nullsweep_planner::link::publish::{Join, PublishError, newest_telemetry};
 use nullsweep_planner::plan::{Plan, PlanError, Program, ProgramStop, Work};
 use nullsweep_planner::stops::{LeftOff, Rest, rest};
-use nullsweep_planner::workcell::stance::told;
 use nullsweep_planner::workcell::{Scene, Stance};
 use nullsweep_robot::{Arm, JointVector, Robot};
 
@@ -21,6 +20,7 @@ use crate::bars::Bars;
 use crate::output::tell;
 use crate::program::{place, tip};
 use crate::program_args::{Asked, Limb, arm_of};
+use crate::program_error::{Astray, Off, Within};
 use crate::program_report::{Outcome, Report, Step, Stood};
 use crate::send::{BRIDGED, HeldElsewhere, LISTEN, Stopped, apart, held_apart};
 use crate::way::Way;
@@ -39,37 +39,6 @@ pub(super) struct Run<'a> {
     pub(super) journal: Journal,
     pub(super) mover: Option<Mover>,
     pub(super) report: Report,
-}
-
-/// Where in a program something went wrong.
-#[derive(Debug, thiserror::Error)]
-#[error("{at}")]
-pub(super) struct Within {
-    at: String,
-    pub(super) program: PathBuf,
-}
-
-/// An arm is not where it may be driven about, or where a plan begins.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum Astray {
-    /// Before a drive.
-    #[error("{arm} is not tucked, so the base is not sent anywhere: {}", .joints.join(", "))]
-    Drive { arm: String, joints: Vec<String> },
-    /// What is around it must be known to bring it on.
-    #[error("{arm} was left on its way, and what is around it is not known")]
-    Unseen { arm: String },
-}
-
-/// The base stands too far off.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "the base stands at {}, where what is to be swept lies up to {:.1} mm from where the plans have it: at most {:.1} mm",
-    told(.stands), 1e3 * .off, 1e3 * .bound
-)]
-pub(super) struct Off {
-    stands: [f64; 3],
-    off: f64,
-    bound: f64,
 }
 
 impl Run<'_> {

@@ -12,7 +12,7 @@ use std::fs::{self, File};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::ValueEnum;
 use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
 use nullsweep_planner::plan::Plan;
@@ -109,7 +109,7 @@ fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     let mut publisher = start_publish(stage, "second", &["--wait"])?;
     let (new, accepted) = system.until(|w| accepted(w, old))?;
     let patience = Duration::from_secs_f64(60.0 + 3.0 * second.figures.task_time_s);
-    finish(&mut publisher, patience)?;
+    publisher.succeed(patience)?;
     system.until(|w| w.mode(Mode::Hold))?;
     let telemetry = system.until(|w| w.see("a last snapshot", |_| true))?;
 
@@ -171,7 +171,7 @@ fn plan(
     options.extend(["--json".into(), figures.clone().into()]);
     options.extend(more.iter().cloned());
     let mut planner = stage.start(Part::Planner, &format!("planner-{name}"), options)?;
-    finish(&mut planner, PLANNING)?;
+    planner.succeed(PLANNING)?;
     let text = fs::read(&figures).with_context(|| format!("no {}", figures.display()))?;
     let figures = serde_json::from_slice(&text).context("the planner's figures")?;
     Ok(Planned { method, cost, figures })
@@ -196,18 +196,7 @@ fn start_publish(stage: &Stage, name: &str, more: &[&str]) -> anyhow::Result<Pro
 }
 
 fn publish(stage: &Stage, name: &str, patience: Duration, more: &[&str]) -> anyhow::Result<()> {
-    finish(&mut start_publish(stage, name, more)?, patience)
-}
-
-/// Waits for a process that must end well.
-fn finish(process: &mut Process, patience: Duration) -> anyhow::Result<()> {
-    match process.wait(patience)? {
-        Some(status) if status.success() => Ok(()),
-        Some(status) => {
-            bail!("{} failed ({status}): {}", process.name(), process.last_words())
-        }
-        None => bail!("{} did not end within {} s", process.name(), patience.as_secs()),
-    }
+    start_publish(stage, name, more)?.succeed(patience)
 }
 
 /// The plan that was answered after `old` began, and the telemetry of that moment.

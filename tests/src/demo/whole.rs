@@ -13,7 +13,6 @@ use nullsweep_planner::plan::Program;
 use serde::Serialize;
 
 use super::args::Args;
-use super::finish;
 use super::outcome::Check;
 use crate::crew::{Crew, Found};
 use crate::stage::{Part, Process, Stage};
@@ -62,7 +61,7 @@ pub(super) fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     let report = std::path::absolute(&args.report)?;
     let path = stage.file("program.json");
     let options = planning(args, stage, &report);
-    finish(&mut stage.start(Part::Planner, "planner", options)?, PLANNING)?;
+    stage.start(Part::Planner, "planner", options)?.succeed(PLANNING)?;
     let program = Program::read(&path)?.context("the planner wrote no program")?;
     // In the order in which they are worked through.
     let works: Vec<(usize, usize, f64)> = program
@@ -110,7 +109,7 @@ pub(super) fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     let json = figures.to_str().context("the stage's folder is no text")?;
     let mut publisher =
         crew.publish(stage, "publish-3", &[&resume[..], &["--json", json]].concat())?;
-    finish(&mut publisher, patience)?;
+    publisher.succeed(patience)?;
 
     say("done; asking the robot for its verdict");
     let found: Found = crew.end(stage)?;
