@@ -150,12 +150,12 @@ mod tests {
             now
         };
         let (once, twice) = (plan(), there_and_back);
-        assert_eq!(left_at(&once, &at(0.35), None), Some(3));
-        assert_eq!(left_at(&once, &at(0.35), Some(3)), Some(3));
+        assert_eq!(left_at(&once, &at(0.36), None), Some(3));
+        assert_eq!(left_at(&once, &at(0.36), Some(3)), Some(3));
         assert_eq!(left_at(&once, &at(1.35), None), None, "elsewhere");
-        assert_eq!(left_at(&twice, &at(0.35), None), None, "on the way there, or back");
-        assert_eq!(left_at(&twice, &at(0.35), Some(2)), Some(3));
-        assert_eq!(left_at(&twice, &at(0.35), Some(14)), Some(14));
-        assert_eq!(left_at(&twice, &at(0.35), Some(7)), None, "too far to have braked");
+        assert_eq!(left_at(&twice, &at(0.36), None), None, "on the way there, or back");
+        assert_eq!(left_at(&twice, &at(0.36), Some(2)), Some(3));
+        assert_eq!(left_at(&twice, &at(0.36), Some(14)), Some(14));
+        assert_eq!(left_at(&twice, &at(0.36), Some(7)), None, "too far to have braked");
     }
 }
