@@ -13,7 +13,7 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use nullsweep_cell::as_called;
 use nullsweep_ipc_types::ports::{Ipc, IpcError, within};
-use nullsweep_ipc_types::{CommandKind, Fault, Mode, Response, Verdict};
+use nullsweep_ipc_types::{BaseCommand, BaseOrder, CommandKind, Fault, Mode, Response, Verdict};
 
 use crate::log::last_words;
 use crate::pidfile::Running;
@@ -60,6 +60,10 @@ enum Ctl {
     Reset,
     /// Tell mode, fault, plan and speed.
     Status,
+    /// Tell a program that waits for the robot's base, whose robot name this is, that the base stands
+    /// where the program has asked for it, and that the joints are set. Goes to `planner publish`, not to
+    /// the executor.
+    Arrived,
 }
 
 /// Sends a command and tells how it was taken.
@@ -80,6 +84,7 @@ pub(crate) fn command(args: &CtlArgs) -> anyhow::Result<ExitCode> {
         Ctl::Stop { disable: true, pid: None } => (CommandKind::StopAndDisable, 0.0),
         Ctl::Reset => (CommandKind::Reset, 0.0),
         Ctl::Status => (CommandKind::Status, 0.0),
+        Ctl::Arrived => return arrived(&args.system),
     };
     let signalled = match args.order {
         Ctl::Stop { disable, .. } => Running::stopped(&args.system, disable),
@@ -114,6 +119,30 @@ fn ask(
 ) -> Result<Response, IpcError> {
     let ipc = Ipc::open(robot, root)?;
     ipc.command_client()?.call(kind, value, ANSWER_WITHIN)
+}
+
+/// Says that the base has arrived, to the program that waits for it.
+fn arrived(system: &SystemArgs) -> anyhow::Result<ExitCode> {
+    let SystemArgs { robot_name, ipc_root } = system.clone();
+    let told = within(COMMAND_WITHIN, move || {
+        let ipc = Ipc::open(&robot_name, ipc_root.as_deref())?;
+        ipc.base_client()?.call(BaseCommand::of(BaseOrder::Arrived), ANSWER_WITHIN)
+    });
+    let status = told.context(HANGS).and_then(|answer| Ok(answer?))?;
+    let verdict = Verdict::from_wire(status.verdict);
+    let accepted = verdict == Some(Verdict::Accepted);
+    let words = match verdict {
+        Some(Verdict::Accepted) => {
+            let [x, y, yaw] = status.pose;
+            format!("accepted; the base is taken to stand at {x:.3},{y:.3},{yaw:.3}")
+        }
+        Some(Verdict::WrongMode) => {
+            "not accepted: what drives the base tells by itself when it has arrived".to_owned()
+        }
+        verdict => verdict.map_or("unknown answer", Verdict::text).to_owned(),
+    };
+    tell(&format!("arrived: {words}"));
+    Ok(if accepted { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Done is done, also where the answer cannot be shown: the exit code tells it too.

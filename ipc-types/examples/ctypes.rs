@@ -16,17 +16,18 @@ fn main() {
 }
 
 /// The sources that hold the payloads, as rustfmt lays them out.
-const SOURCES: [&str; 6] = [
+const SOURCES: [&str; 7] = [
     include_str!("../src/plan.rs"),
     include_str!("../src/setpoint.rs"),
     include_str!("../src/state.rs"),
     include_str!("../src/telemetry.rs"),
     include_str!("../src/event.rs"),
     include_str!("../src/command.rs"),
+    include_str!("../src/base.rs"),
 ];
 
 /// The payloads and their sizes as the compiler has them.
-const SIZES: [(&str, usize); 9] = [
+const SIZES: [(&str, usize); 12] = [
     ("PlanId", size_of::<wire::PlanId>()),
     ("Knot", size_of::<wire::Knot>()),
     ("PlanHeader", size_of::<wire::PlanHeader>()),
@@ -36,6 +37,9 @@ const SIZES: [(&str, usize); 9] = [
     ("PlanEvent", size_of::<wire::PlanEvent>()),
     ("Command", size_of::<wire::Command>()),
     ("Response", size_of::<wire::Response>()),
+    ("BaseJoint", size_of::<wire::BaseJoint>()),
+    ("BaseCommand", size_of::<wire::BaseCommand>()),
+    ("BaseStatus", size_of::<wire::BaseStatus>()),
 ];
 
 /// The Python module.
@@ -166,7 +170,9 @@ fn python(kind: &str) -> (String, usize) {
         "u64" => simple("c_uint64", 8),
         "u32" => simple("c_uint32", 4),
         "f64" => simple("c_double", 8),
+        "u8" => simple("c_uint8", 1),
         "PlanId" => ("PlanId".into(), 16),
+        "BaseJoint" => ("BaseJoint".into(), size_of::<wire::BaseJoint>()),
         "JointArray" => ("ctypes.c_double * MAX_JOINTS".into(), 8 * wire::MAX_JOINTS),
         array => {
             let (item, count) =

@@ -19,6 +19,7 @@
 #[cfg(any(test, feature = "ports"))]
 extern crate std;
 
+mod base;
 mod command;
 mod event;
 mod plan;
@@ -29,6 +30,7 @@ mod setpoint;
 mod state;
 mod telemetry;
 
+pub use base::{BaseCommand, BaseJoint, BaseOrder, BaseState, BaseStatus};
 pub use command::{Command, CommandKind, Response, Verdict};
 pub use event::{EventKind, PlanEvent, Reason};
 pub use plan::{Contact, Interpolation, JoinRule, Knot, PlanHeader, PlanId, PlanMessage, checksum};

@@ -8,6 +8,7 @@
 //! | `nullsweep/<robot>/telemetry` | `Telemetry` | 1 → 8 | 64 | 1 |
 //! | `nullsweep/<robot>/plan_event` | `PlanEvent` | 1 → 8 | 64 | 16 |
 //! | `nullsweep/<robot>/command` | `Command` → `Response` | 4 clients, 1 server | 4 | – |
+//! | `nullsweep/<robot>/base` | `BaseCommand` → `BaseStatus` | 4 clients, 1 server | 4 | – |
 //!
 //! Allocation is static everywhere and no send ever blocks. A plan overflows nowhere: what does
 //! not fit is discarded and the publisher is told. Streams of states overwrite the oldest.
@@ -87,6 +88,12 @@ pub const COMMAND: &str = "command";
 pub const COMMAND_CLIENTS: usize = 4;
 /// Questions that one of them may have open.
 pub const COMMAND_REQUESTS: usize = 4;
+/// Last part of the name of the service of what moves the robot's base.
+pub const BASE: &str = "base";
+/// Most clients of the base service.
+pub const BASE_CLIENTS: usize = 4;
+/// Questions that one of them may have open.
+pub const BASE_REQUESTS: usize = 4;
 /// Nodes (processes) that may open one service at once.
 pub const MAX_NODES: usize = 20;
 /// The robot's name in the service names where none is given.

@@ -7,8 +7,9 @@ use std::time::Duration;
 use bytemuck::Zeroable;
 use nullsweep_ipc_types::ports::{Ipc, IpcError, now_ns};
 use nullsweep_ipc_types::{
-    CommandKind, EventKind, JointStates, Knot, MAX_KNOTS, PlanEvent, PlanHeader, PlanId,
-    PlanMessage, Reason, Response, Setpoint, Telemetry, Verdict, checksum,
+    BaseCommand, BaseJoint, BaseOrder, BaseState, BaseStatus, CommandKind, EventKind, JointStates,
+    Knot, MAX_KNOTS, PlanEvent, PlanHeader, PlanId, PlanMessage, Reason, Response, Setpoint,
+    Telemetry, Verdict, checksum,
 };
 use tempfile::TempDir;
 
@@ -208,6 +209,41 @@ fn commands_there_and_back() {
 }
 
 #[test]
+fn the_base_is_asked_and_answers() {
+    let (_root, program, driver) = doors();
+    let client = program.base_client().unwrap();
+    let none = client.call(BaseCommand::of(BaseOrder::Status), Duration::ZERO).unwrap_err();
+    assert!(matches!(none, IpcError::NoBase { .. }) && !client.is_answered(), "{none}");
+
+    let server = driver.base_server().unwrap();
+    assert!(client.is_answered());
+    let mute = client.call(BaseCommand::of(BaseOrder::Arrived), Duration::ZERO).unwrap_err();
+    assert!(matches!(mute, IpcError::MuteBase { .. }), "{mute}");
+
+    let mut drive =
+        BaseCommand { goal: 7, pose: [1.0, -2.0, 0.5], ..BaseCommand::of(BaseOrder::Drive) };
+    drive.joints[0] = BaseJoint::new("torso_lift_joint", 0.2).unwrap();
+    drive.joint_count = 1;
+    thread::scope(|s| {
+        s.spawn(|| {
+            let client = program.base_client().unwrap();
+            let status = client.call(drive, Duration::from_secs(20)).unwrap();
+            assert_eq!((status.goal, status.state), (7, BaseState::Driving.wire()));
+        });
+        let request = loop {
+            if let Some(request) = server.receive().unwrap() {
+                break request;
+            }
+            thread::sleep(Duration::from_millis(1));
+        };
+        let asked = request.command();
+        assert_eq!(asked, drive);
+        let state = BaseState::Driving.wire();
+        request.answer(BaseStatus { goal: asked.goal, state, ..BaseStatus::zeroed() }).unwrap();
+    });
+}
+
+#[test]
 fn single_places_are_single() {
     let (_root, a, b) = doors();
     let _plan = a.plan_receiver().unwrap();
@@ -216,6 +252,7 @@ fn single_places_are_single() {
     let _telemetry = a.telemetry_sender().unwrap();
     let _event = a.event_sender().unwrap();
     let _command = a.command_server().unwrap();
+    let _base = a.base_server().unwrap();
     let taken = |e: IpcError| assert!(matches!(e, IpcError::Taken { .. }), "{e}");
     taken(b.plan_receiver().unwrap_err());
     taken(b.setpoint_sender().unwrap_err());
@@ -223,6 +260,7 @@ fn single_places_are_single() {
     taken(b.telemetry_sender().unwrap_err());
     taken(b.event_sender().unwrap_err());
     taken(b.command_server().unwrap_err());
+    taken(b.base_server().unwrap_err());
 }
 
 #[test]

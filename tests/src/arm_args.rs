@@ -30,13 +30,18 @@ pub struct ArmArgs {
 }
 
 impl ArmArgs {
+    /// The robot.
+    pub fn robot(&self) -> anyhow::Result<Robot> {
+        match &self.urdf {
+            Some(path) => Robot::from_urdf_file(path)
+                .with_context(|| format!("cannot use {} as a robot", path.display())),
+            None => Ok(Robot::pr2()),
+        }
+    }
+
     /// The arm with its held joints in place.
     pub fn load(&self) -> anyhow::Result<Arm> {
-        let robot = match &self.urdf {
-            Some(path) => Robot::from_urdf_file(path)
-                .with_context(|| format!("cannot use {} as a robot", path.display()))?,
-            None => Robot::pr2(),
-        };
+        let robot = self.robot()?;
         let mut held: Vec<(&str, f64)> = Vec::new();
         held.extend(self.held.iter().map(|(name, position)| (name.as_str(), *position)));
         held.extend(self.torso.map(|height| ("torso_lift_joint", height)));

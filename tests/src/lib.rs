@@ -4,6 +4,8 @@
 //! * [`mock`]: a simulated arm as a process, made of an [`endpoint`] (setpoints and a time in,
 //!   states out), a [`plant`] (a joint [`servo`], or the PR2's [`mechanism`]), the [`judge`] of
 //!   every setpoint, and [`fault`]s on request.
+//! * [`whole`]: a simulated robot with several arms on a [`base`] that drives.
+//!   [`crew`]: it, its executors, and who works through a program.
 //! * [`stage`]: processes under one root path; [`parts`]: one program that plays them all;
 //!   [`system`]: mock and executor on a stage, from their start to the verdict.
 //! * [`sketch`]: joint plans without a surface; [`publisher`]: publishes one as a process.
@@ -13,8 +15,10 @@
 //!   happen; [`loopback`]: executor and endpoint under a virtual clock.
 
 pub mod arm_args;
+pub mod base;
 pub mod clock;
 pub mod conformance;
+pub mod crew;
 pub mod demo;
 pub mod endpoint;
 pub mod fault;
@@ -35,4 +39,5 @@ pub mod soak;
 pub mod stage;
 pub mod system;
 pub mod tracking;
+pub mod whole;
 pub mod witness;

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +18,7 @@ use nullsweep_executor::log::last_words;
 use nullsweep_executor::rt::become_real_time;
 use nullsweep_ipc_types::ports::{Ipc, now_ns};
 use nullsweep_ipc_types::service;
+use nullsweep_planner::link::Post;
 use nullsweep_planner::plan::Plan;
 use nullsweep_robot::{Arm, JointVector};
 use serde::Serialize;
@@ -31,6 +32,7 @@ use crate::judge::{Rules, Verdict};
 use crate::measured::{Swept, swept};
 use crate::record::Recorder;
 use crate::tracking::Tracking;
+use crate::whole;
 
 const PERIOD_NS: u64 = 1_000_000;
 
@@ -49,6 +51,32 @@ struct Args {
     /// surface
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
+    /// Be the whole robot that this program was made for: a base that drives, and the program's arms, each
+    /// behind the services of an executor of its own. Measures what they sweep together
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["plan", "initial", "record", "seconds"])]
+    program: Option<PathBuf>,
+    /// With --program: the robot's name of an arm's services, as in left=pr2-left; of each, where the
+    /// program has several
+    #[arg(long, value_name = "ARM=NAME", requires = "program")]
+    executor: Vec<Post>,
+    /// With --program: where the base stands at first, x,y,yaw in m and rad
+    #[arg(
+        long,
+        value_parser = place,
+        allow_hyphen_values = true,
+        value_name = "X,Y,YAW",
+        requires = "program"
+    )]
+    stands: Option<[f64; 3]>,
+    /// With --program: how far off its goal the base ends each drive, x,y,yaw in m and rad
+    #[arg(
+        long,
+        value_parser = place,
+        allow_hyphen_values = true,
+        value_name = "X,Y,YAW",
+        requires = "program"
+    )]
+    base_off: Option<[f64; 3]>,
     /// Where the joints stand at first, base to tip; without it, the arm's home, in rad
     #[arg(
         long,
@@ -117,8 +145,12 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(args) => args,
         Err(error) => error.exit(),
     };
-    match run(&args) {
-        Ok(outcome) if outcome.violations == 0 => ExitCode::SUCCESS,
+    let violations = match &args.program {
+        Some(program) => run_whole(&args, program),
+        None => run(&args).map(|outcome| outcome.violations),
+    };
+    match violations {
+        Ok(0) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
             last_words(&format!("mock-hardware: {}", causes(error.as_ref())));
@@ -127,16 +159,60 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// Asked to end: by SIGTERM or SIGINT.
+fn ending() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGTERM, SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    Ok(stop)
+}
+
+fn place(text: &str) -> Result<[f64; 3], String> {
+    let values: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    let values = values.map_err(|e| format!("{e}: x,y,yaw is wanted"))?;
+    let finite = values.iter().all(|value| value.is_finite());
+    let three = values.try_into().map_err(|_| "three numbers are wanted: x,y,yaw".to_owned())?;
+    if finite { Ok(three) } else { Err("finite numbers are wanted".into()) }
+}
+
+fn behaviour(args: &Args) -> Behaviour {
+    let session_timeout_ns = args.timeout.saturating_mul(1_000_000);
+    Behaviour {
+        fidelity: args.fidelity,
+        payload: args.payload,
+        wrap: args.wrap,
+        rules: Rules { session_timeout_ns, ..Rules::default() },
+        faults: args.fault.clone(),
+    }
+}
+
+/// Is the whole robot; how many violations there were.
+fn run_whole(args: &Args, program: &Path) -> anyhow::Result<u64> {
+    let config = whole::Config {
+        program: program.into(),
+        robot: args.arm.robot()?,
+        robot_name: args.arm.robot_name.clone(),
+        ipc_root: args.arm.ipc_root.clone(),
+        posts: args.executor.clone(),
+        base: args.stands.unwrap_or_default(),
+        off: args.base_off.unwrap_or_default(),
+        behaviour: behaviour(args),
+        every_ns: args.record_every.max(1) * 1_000_000,
+        priority: args.priority,
+    };
+    let outcome = whole::run(&config, &ending()?)?;
+    tell(args, &outcome, &whole::table(&outcome))?;
+    Ok(outcome.violations)
+}
+
 fn run(args: &Args) -> anyhow::Result<Outcome> {
     let plan = match &args.plan {
         Some(path) => Some(Plan::read(path).context("--plan")?),
         None => None,
     };
     let (arm, initial) = scene(args, plan.as_ref())?;
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGTERM, SIGINT] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
+    let stop = ending()?;
 
     let ipc = Ipc::open(&args.arm.robot_name, args.arm.ipc_root.as_deref())?;
     let setpoints = ipc.setpoint_receiver()?;
@@ -149,17 +225,8 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
         args.arm.robot_name
     ));
 
-    let rules =
-        Rules { session_timeout_ns: args.timeout.saturating_mul(1_000_000), ..Rules::default() };
-    let behaviour = Behaviour {
-        fidelity: args.fidelity,
-        payload: args.payload,
-        wrap: args.wrap,
-        rules,
-        faults: args.fault.clone(),
-    };
     let start_ns = now_ns();
-    let mut endpoint = Endpoint::new(&arm, initial, behaviour, start_ns)?;
+    let mut endpoint = Endpoint::new(&arm, initial, behaviour(args), start_ns)?;
     let mut recorder = Recorder::new(args.record_every.max(1) * 1_000_000);
     let end_ns = args.seconds.map(|s| start_ns + Duration::from_secs_f64(s).as_nanos() as u64);
 
@@ -206,7 +273,7 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
         recorder.write_csv(arm.joint_names(), &mut out)?;
         out.flush()?;
     }
-    report(args, &outcome)?;
+    tell(args, &outcome, &table(&outcome))?;
     Ok(outcome)
 }
 
@@ -232,7 +299,7 @@ fn scene(args: &Args, plan: Option<&Plan>) -> anyhow::Result<(Arm, JointVector)>
     Ok((arm, initial))
 }
 
-fn report(args: &Args, outcome: &Outcome) -> anyhow::Result<()> {
+fn tell(args: &Args, outcome: &impl Serialize, table: &str) -> anyhow::Result<()> {
     match &args.json {
         Some(path) if path.as_os_str() == "-" => {
             serde_json::to_writer_pretty(io::stdout().lock(), outcome)?;
@@ -242,9 +309,9 @@ fn report(args: &Args, outcome: &Outcome) -> anyhow::Result<()> {
             let file = File::create(path)
                 .with_context(|| format!("cannot write the verdict to {}", path.display()))?;
             serde_json::to_writer_pretty(file, outcome)?;
-            println!("{}", table(outcome));
+            println!("{table}");
         }
-        None => println!("{}", table(outcome)),
+        None => println!("{table}"),
     }
     Ok(())
 }

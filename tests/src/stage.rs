@@ -8,7 +8,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use std::{io, thread};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use rustix::process::{Pid, Signal, getppid, kill_process, set_parent_process_death_signal};
 use tempfile::TempDir;
 
@@ -200,6 +200,15 @@ impl Process {
                 return Ok(status);
             }
             thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Waits for it to end well, at most `timeout`.
+    pub fn succeed(&mut self, timeout: Duration) -> anyhow::Result<()> {
+        match self.wait(timeout)? {
+            Some(status) if status.success() => Ok(()),
+            Some(status) => bail!("{} failed ({status}): {}", self.name(), self.last_words()),
+            None => bail!("{} did not end within {} s", self.name(), timeout.as_secs()),
         }
     }
 

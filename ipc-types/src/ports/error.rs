@@ -38,6 +38,20 @@ pub enum IpcError {
         /// The root path, `None` for the default.
         root: Option<PathBuf>,
     },
+    /// Nothing moves this robot's base, and nobody waits for it.
+    #[error("nothing answers for the base of robot `{robot}`, and no program waits for it")]
+    NoBase {
+        /// The robot's name.
+        robot: String,
+    },
+    /// What moves the base did not answer in time.
+    #[error("what moves the base of robot `{robot}` did not answer within {millis} ms")]
+    MuteBase {
+        /// The robot's name.
+        robot: String,
+        /// How long was waited. \[ms\]
+        millis: u128,
+    },
     /// The service's only place is taken.
     #[error(
         "{what}: all places are taken ({detail}); is another one running under this root path?"

@@ -9,9 +9,11 @@
 //! folder, so a root of one's own also gets a prefix of its own there, which is what lets two
 //! users on one machine run side by side.
 
+mod base;
 mod clock;
 mod command;
 mod error;
+mod inquiry;
 mod node;
 mod owner;
 mod plan;
@@ -21,6 +23,7 @@ mod stream;
 
 use crate::service;
 use crate::{JointStates, PlanEvent, Setpoint, Telemetry};
+pub use base::{BaseClient, BaseRequest, BaseServer};
 pub use clock::now_ns;
 pub use command::{Asked, CommandClient, CommandServer, Request};
 pub use error::{IpcError, PortError};
@@ -90,6 +93,16 @@ impl Ipc {
     /// An operator's end of the command service.
     pub fn command_client(&self) -> Result<CommandClient, IpcError> {
         CommandClient::open(self)
+    }
+
+    /// The end of what moves the robot's base. There is one.
+    pub fn base_server(&self) -> Result<BaseServer, IpcError> {
+        BaseServer::open(self)
+    }
+
+    /// The end of whoever asks for a pose of the base, or says that it was reached.
+    pub fn base_client(&self) -> Result<BaseClient, IpcError> {
+        BaseClient::open(self)
     }
 }
 

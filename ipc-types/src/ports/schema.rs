@@ -5,8 +5,11 @@ use std::string::{String, ToString};
 
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 
-use crate::service::{COMMAND, PLAN, PLAN_EVENT, SETPOINT, STATE, TELEMETRY};
-use crate::{Command, JointStates, Knot, PlanEvent, PlanHeader, Response, Setpoint, Telemetry};
+use crate::service::{BASE, COMMAND, PLAN, PLAN_EVENT, SETPOINT, STATE, TELEMETRY};
+use crate::{
+    BaseCommand, BaseStatus, Command, JointStates, Knot, PlanEvent, PlanHeader, Response, Setpoint,
+    Telemetry,
+};
 
 /// A payload of a service, as its type is named on the wire.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,7 +24,7 @@ pub struct Shape {
 
 /// Every payload: what is sent, then what comes with it or is answered.
 #[must_use]
-pub fn schema() -> [Shape; 8] {
+pub fn schema() -> [Shape; 10] {
     [
         shape(PLAN.name, TypeDetail::new::<PlanHeader>(TypeVariant::FixedSize)),
         shape(PLAN.name, TypeDetail::new::<Knot>(TypeVariant::Dynamic)),
@@ -31,6 +34,8 @@ pub fn schema() -> [Shape; 8] {
         shape(PLAN_EVENT.name, TypeDetail::new::<PlanEvent>(TypeVariant::FixedSize)),
         shape(COMMAND, TypeDetail::new::<Command>(TypeVariant::FixedSize)),
         shape(COMMAND, TypeDetail::new::<Response>(TypeVariant::FixedSize)),
+        shape(BASE, TypeDetail::new::<BaseCommand>(TypeVariant::FixedSize)),
+        shape(BASE, TypeDetail::new::<BaseStatus>(TypeVariant::FixedSize)),
     ]
 }
 

@@ -6,6 +6,7 @@ use std::error::Error;
 use nullsweep_collision::{CollisionError, MeshError};
 use nullsweep_ipc_types::{Mode, Reason};
 use nullsweep_planner::follow::FollowError;
+use nullsweep_planner::link::journal::JournalError;
 use nullsweep_planner::link::posture::PostureError;
 use nullsweep_planner::link::publish::PublishError;
 use nullsweep_planner::link::replan::ReplanError;
@@ -21,10 +22,14 @@ use nullsweep_surface::register::RegisterError;
 use nullsweep_surface::room::LevelError;
 use nullsweep_surface::scan::ScanWarning;
 
+use crate::program_error::{Astray, Off, Within};
 use crate::send::{Elsewhere, HeldElsewhere, Stopped};
 
 /// A line of advice for an error, where a flag can help: that of the outermost cause with any.
 pub(super) fn advice(error: &anyhow::Error) -> Option<String> {
+    if let Some(within) = error.downcast_ref::<Within>() {
+        return Some(within_program(within, error));
+    }
     error.chain().find_map(known)
 }
 
@@ -57,6 +62,7 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         transit(error)
     } else if let Some(error) = error.downcast_ref() {
         posture(error)
+<<<<<<< HEAD
     } else if let Some(VerifyError::OtherRegions { .. }) = error.downcast_ref() {
         Some("give --regions as it was given to `plan`".into())
     } else if let Some(RegionError::Nothing { .. }) = error.downcast_ref() {
@@ -65,6 +71,10 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
              the first scan file's own"
                 .into(),
         )
+=======
+    } else if let Some(error) = error.downcast_ref() {
+        journal(error).map(Into::into)
+>>>>>>> program8
     } else if let Some(LevelError::NoPlane { .. }) = error.downcast_ref() {
         Some(
             "say how the scan stands: --up X,Y,Z (against gravity, in the file's frame) with \
@@ -250,6 +260,34 @@ fn stopped(error: &Stopped) -> String {
         ),
         None => "`planner goto` again goes on from where the arm stands".into(),
     }
+}
+
+fn journal(error: &JournalError) -> Option<&'static str> {
+    match error {
+        JournalError::Open { .. } => Some("--resume goes on with it; to begin anew, remove it"),
+        JournalError::OtherProgram { .. } => Some("--journal names another one; or remove it"),
+        JournalError::None { .. } => Some("without --resume the program is begun"),
+        _ => None,
+    }
+}
+
+/// What goes on with a program that was left on its way.
+fn within_program(within: &Within, error: &anyhow::Error) -> String {
+    let first = match (error.downcast_ref::<Astray>(), error.downcast_ref::<Off>()) {
+        (Some(Astray::Drive { .. }), _) => {
+            "bring it there: `planner goto --plan PLAN SCAN…`, with a plan of this arm that `planner inspect \
+             PROGRAM --plans FOLDER` writes; then "
+        }
+        (Some(Astray::Unseen { .. }), _) => "say what is around it: ",
+        (_, Some(_)) => "drive it nearer, or allow more by --base-off; then ",
+        _ if error.is::<HeldElsewhere>() => "set them by the robot's own controls; then ",
+        _ => "once the cause is gone, ",
+    };
+    let program = within.program.display();
+    format!(
+        "{first}`planner publish {program} --resume SCAN…` goes on with what is left, with the scans and their \
+         flags as they were given to `plan`"
+    )
 }
 
 fn replan(error: &ReplanError) -> Option<String> {

@@ -30,7 +30,11 @@ mod plan_command;
 mod posture;
 mod posture_arg;
 mod program;
+mod program_args;
+mod program_error;
+mod program_report;
 mod publish;
+mod publish_program;
 mod refusal;
 mod replan;
 mod robot;
@@ -41,6 +45,7 @@ mod scene_file;
 mod send;
 mod sheet;
 mod site;
+mod stop_run;
 mod stops;
 mod table;
 mod task;
@@ -90,7 +95,7 @@ enum Command {
     Verify(Box<verify::VerifyArgs>),
     /// Show plans, scans and scenes in a browser: the arm moving, what is swept and what is left.
     View(Box<view::ViewArgs>),
-    /// Send a plan to the executor.
+    /// Send a plan to the executor, or work through a program, stop after stop.
     Publish(Box<publish::PublishArgs>),
     /// Bring the arm from where it is to a posture, or to a plan's start.
     Goto(Box<goto::GotoArgs>),

@@ -80,7 +80,7 @@ pub(super) fn stop_rows(program: &Program) -> Vec<Vec<String>> {
                 once(told(&stop.base)),
                 once(held.join(", ")),
                 once(format!("{:.1} m", stop.drive_m)),
-                work.arm.rsplit(',').next().unwrap_or(&work.arm).to_owned(),
+                tip(work).to_owned(),
                 percent(work.adds),
                 percent(work.kept_off_place),
                 format!("{:.1} s", work.plan.duration()),
@@ -118,4 +118,15 @@ pub(super) fn totals_rows(t: &Totals) -> Vec<Vec<String>> {
         row(&format!("  {}", left.why), format!("{} patches, {share}", left.patches));
     }
     rows
+}
+
+/// The arm's last link, by which people know it.
+pub(super) fn tip(work: &Work) -> &str {
+    work.arm.rsplit(',').next().unwrap_or(&work.arm)
+}
+
+/// A stop as people are told where it is.
+pub(super) fn place(stop: &ProgramStop) -> String {
+    let held = stop.held.iter().map(|(name, at)| format!(", {name} at {at}"));
+    format!("{}{}", told(&stop.base), held.collect::<String>())
 }

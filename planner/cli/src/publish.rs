@@ -5,13 +5,15 @@ use std::path::PathBuf;
 use clap::{Arg, Args, Command};
 use nullsweep_ipc_types::Reason;
 use nullsweep_planner::link::publish::{Join, PublishError};
-use nullsweep_planner::plan::Plan;
+use nullsweep_planner::plan::{Plan, PlanError, Program};
 use nullsweep_robot::Arm;
 
 use crate::bars::Bars;
 use crate::choices::JoinArg;
 use crate::exit::{OK, Usage, VIOLATIONS};
 use crate::output::{complain, say, say_on};
+use crate::program_args::{Asked, ProgramArgs};
+use crate::publish_program;
 use crate::robot::{RobotArgs, differs};
 use crate::send::{SendArgs, interruption, outlook, resting};
 use crate::site::SiteArgs;
@@ -20,13 +22,13 @@ use crate::way::{Broken, Found, Way, WayArgs};
 #[derive(Debug, Args)]
 #[command(mut_args(only_with_goto))]
 pub(super) struct PublishArgs {
-    /// The plan file.
+    /// The plan file, or the program of `planner plan --stops`.
     plan: PathBuf,
-    /// With --goto: the scans that the plan was made for, given as they were to `plan`.
-    #[arg(requires = "goto")]
+    /// With --goto or --resume: the scans that the plan was made for, given as they were to `plan`.
+    #[arg(requires = SEEN)]
     scans: Vec<PathBuf>,
     /// Bring the arm to the plan's start first, free of collision, as `planner goto` does.
-    #[arg(long)]
+    #[arg(long, group = SEEN)]
     goto: bool,
     /// How it joins what is going on; without it at its knot for a plan that continues another
     /// one, else after a stop.
@@ -42,13 +44,25 @@ pub(super) struct PublishArgs {
     send: SendArgs,
     #[command(flatten)]
     site: SiteArgs,
-    #[command(flatten, next_help_heading = "The robot, and what is around it with --goto")]
+    #[command(flatten, next_help_heading = "Of a program")]
+    program: ProgramArgs,
+    #[command(
+        flatten,
+        next_help_heading = "The robot, and what is around it with --goto or --resume"
+    )]
     robot: RobotArgs,
     #[command(flatten)]
     way: WayArgs,
 }
 
 pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
+    match Program::read(&args.plan) {
+        Ok(Some(program)) => return publish_program::run(args.of_program()?, &program),
+        // A plan's reader says more of a file that is none.
+        Ok(None) | Err(PlanError::File { .. }) => {}
+        Err(error) => return Err(error.into()),
+    }
+    args.program.of_a_plan()?;
     let plan = Plan::read(&args.plan)?;
     match plan.check_seal() {
         Err(error) if args.unverified => complain!("planner: warning: {error}; it is sent anyway"),
@@ -94,14 +108,26 @@ pub(super) fn run(args: &PublishArgs) -> anyhow::Result<u8> {
     Ok(OK)
 }
 
+/// Flags by which it matters what is around the arm.
+const SEEN: &str = "seen";
+
 /// What says how the way to the start is planned says nothing without one.
 fn only_with_goto(arg: Arg) -> Arg {
     let way = WayArgs::augment_args(Command::new("way"));
     let is_ways = way.get_arguments().any(|of_way| of_way.get_id() == arg.get_id());
-    if is_ways { arg.requires("goto") } else { arg }
+    if is_ways { arg.requires(SEEN) } else { arg }
 }
 
 impl PublishArgs {
+    /// What they say of a program.
+    fn of_program(&self) -> Result<Asked<'_>, Usage> {
+        if self.join.is_some() {
+            return Err(Usage("--join is for plans: those of a program begin at rest".into()));
+        }
+        let Self { plan, scans, unverified, program, send, site, robot, way, .. } = self;
+        Ok(Asked { file: plan, scans, unverified: *unverified, program, send, site, robot, way })
+    }
+
     /// The plan's arm, where the arguments name it: who sends a plan need not say which robot it is of.
     fn arm_of(&self, plan: &Plan) -> Option<Arm> {
         let held: Vec<_> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();

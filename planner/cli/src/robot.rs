@@ -13,7 +13,7 @@ use nullsweep_robot::{Arm, ArmSpec, Robot, Side, Tool};
 use crate::bars::Bars;
 use crate::posture_arg::NamedPosture;
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct RobotArgs {
     /// The robot's URDF; without it the PR2.
     #[arg(long, value_name = "FILE")]
@@ -70,6 +70,11 @@ impl RobotArgs {
             Some(path) => Robot::from_urdf_file(path)?,
             None => Robot::pr2(),
         })
+    }
+
+    /// The same with another of the robot's arms.
+    pub(super) fn with_arm(&self, arm: ArmSpec) -> Self {
+        Self { arm, ..self.clone() }
     }
 
     pub(super) fn spec(&self) -> ArmSpec {

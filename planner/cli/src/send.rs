@@ -8,11 +8,11 @@ use std::time::Duration;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use nullsweep_collision::Margins;
-use nullsweep_ipc_types::{Mode, PlanEvent, Reason, Telemetry};
+use nullsweep_ipc_types::{Mode, PlanEvent, PlanId, Reason, Telemetry};
 use nullsweep_planner::link::Site;
 use nullsweep_planner::link::posture::{Posture, PostureError, posture, unit, unit_of_held};
 use nullsweep_planner::link::publish::{
-    Join, Patience, PublishError, Watcher, describe_for, publish,
+    Join, Patience, PublishError, Watcher, describe_for, fate, publish,
 };
 use nullsweep_planner::plan::{Held, Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
@@ -36,7 +36,7 @@ pub(super) struct SendArgs {
 pub(super) const LISTEN: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_secs(1);
 /// What an executor bridges by itself unless it is told otherwise. \[rad\] or \[m\]
-const BRIDGED: f64 = 0.02;
+pub(super) const BRIDGED: f64 = 0.02;
 /// How far a held joint may be unless an executor is told otherwise. \[rad\] or \[m\]
 const HELD: f64 = 0.002;
 /// A way to a plan's start that is worth a word. \[rad\] or \[m\]
@@ -73,7 +73,7 @@ pub(super) struct HeldOff {
 
 /// The held joints that are farther from where a plan has them than an executor allows unless it is told
 /// otherwise.
-fn held_apart(plan: &Plan, arm: &Arm, now: &Posture) -> Vec<HeldOff> {
+pub(super) fn held_apart(plan: &Plan, arm: &Arm, now: &Posture) -> Vec<HeldOff> {
     let both = plan.held.iter().zip(&now.held);
     let off = both.filter_map(|(Held { name, position: planned }, &stands)| {
         let unit = unit_of_held(arm, name);
@@ -90,7 +90,7 @@ fn held_apart(plan: &Plan, arm: &Arm, now: &Posture) -> Vec<HeldOff> {
 #[derive(Debug, thiserror::Error)]
 #[error("ended early: {}", describe_for(.event, &[], &[]))]
 pub(super) struct Stopped {
-    event: Box<PlanEvent>,
+    pub(super) event: Box<PlanEvent>,
     /// The plan's file; none of a way to a posture.
     pub(super) plan: Option<PathBuf>,
 }
@@ -118,7 +118,7 @@ pub(super) fn interruption(site: Site<'_>, arm: &Arm) -> &'static str {
 }
 
 /// How far each joint is from a plan's start, by name, where it is by more than `bound`.
-fn apart(plan: &Plan, arm: &Arm, now: &Posture, bound: f64) -> Vec<String> {
+pub(super) fn apart(plan: &Plan, arm: &Arm, now: &Posture, bound: f64) -> Vec<String> {
     let Some(first) = plan.knots.first() else { return Vec::new() };
     let apart = arm.continuous().displacement(&now.q, &first.q);
     let joints = arm.joint_names().iter().enumerate().zip(&apart);
@@ -215,6 +215,27 @@ fn swept(plan: &Plan, arm: &Arm) -> Option<[f64; 2]> {
 }
 
 impl SendArgs {
+    /// How long a plan is waited for: its end comes after the plans before it and may be slowed down, so
+    /// generously.
+    fn patience(&self, plan: &Plan) -> Patience {
+        let end = Some(Duration::from_secs_f64(10.0 * plan.duration() + 600.0));
+        Patience { admission: self.timeout, end }
+    }
+
+    /// What became of a plan that was sent before, see [`fate`]; how far it is is shown while it runs.
+    pub(super) fn fate(
+        &self,
+        id: PlanId,
+        plan: &Plan,
+        site: Site<'_>,
+    ) -> Result<Option<PlanEvent>, PublishError> {
+        let mut told = |_: &PlanEvent| ();
+        let mut show = Show::new(plan, &mut told);
+        let fate = fate(id, site, self.patience(plan), &mut show);
+        show.bar.finish_and_clear();
+        fate
+    }
+
     /// Asks whether to go on, where there is somebody to ask.
     pub(super) fn confirm(&self) -> Result<(), NotSent> {
         if self.yes || !std::io::stdin().is_terminal() {
@@ -241,10 +262,24 @@ impl SendArgs {
         join: Join,
         wait: bool,
     ) -> anyhow::Result<()> {
-        // An end comes after the plans before it and may be slowed down: be generous.
-        let end = wait.then(|| Duration::from_secs_f64(10.0 * plan.duration() + 600.0));
-        let patience = Patience { admission: self.timeout, end };
-        let mut show = Show::new(plan);
+        self.send_told((plan, file), (arm, site), join, wait, &mut |_| ())
+    }
+
+    /// The same, and `told` is told every event of the plan.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub(super) fn send_told(
+        &self,
+        (plan, file): (&Plan, Option<&Path>),
+        (arm, site): (Option<&Arm>, Site<'_>),
+        join: Join,
+        wait: bool,
+        told: &mut dyn FnMut(&PlanEvent),
+    ) -> anyhow::Result<()> {
+        let patience = Patience { end: None, ..self.patience(plan) };
+        let patience = if wait { self.patience(plan) } else { patience };
+        let mut show = Show::new(plan, told);
         let sent = publish(plan, site.robot, site.root, join, patience, &mut show);
         show.bar.finish_and_clear();
         let Err(error) = sent else { return Ok(()) };
@@ -280,26 +315,28 @@ impl SendArgs {
 const STEPS: u64 = 1000;
 
 /// Events as lines, and a bar with the time that is left.
-struct Show {
+struct Show<'a> {
+    told: &'a mut dyn FnMut(&PlanEvent),
     bar: ProgressBar,
     duration: f64,
     joints: Vec<String>,
     held: Vec<Held>,
 }
 
-impl Show {
-    fn new(plan: &Plan) -> Self {
+impl<'a> Show<'a> {
+    fn new(plan: &Plan, told: &'a mut dyn FnMut(&PlanEvent)) -> Self {
         let bar = ProgressBar::new(STEPS);
         if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
         let (joints, held) = (plan.joints.clone(), plan.held.clone());
-        Self { bar, duration: plan.duration(), joints, held }
+        Self { told, bar, duration: plan.duration(), joints, held }
     }
 }
 
-impl Watcher for Show {
+impl Watcher for Show<'_> {
     fn event(&mut self, event: &PlanEvent) {
+        (self.told)(event);
         self.bar.suspend(|| tell!("{}", describe_for(event, &self.joints, &self.held)));
     }
 

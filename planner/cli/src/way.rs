@@ -91,8 +91,19 @@ impl WayArgs {
         to: JointVector,
         bars: &Bars,
     ) -> anyhow::Result<Option<Found>> {
-        let arm = way.arm()?;
         let scene = self.scene(way, bars)?;
+        self.find_in(way, &scene, to, bars)
+    }
+
+    /// The same in a scene that is known, in the floor frame.
+    pub(super) fn find_in(
+        &self,
+        way: &Way<'_>,
+        scene: &Scene,
+        to: JointVector,
+        bars: &Bars,
+    ) -> anyhow::Result<Option<Found>> {
+        let arm = way.arm()?;
         let now = posture(way.site, &arm, LISTEN)?;
         now.notes.iter().for_each(|note| bars.note(note));
         let job = Transit {
@@ -107,7 +118,7 @@ impl WayArgs {
             collision: way.robot.collision(),
             seed: self.seed.unwrap_or(1),
         };
-        let found = transit::run(&way.robot.robot()?, &scene, &job, bars);
+        let found = transit::run(&way.robot.robot()?, scene, &job, bars);
         bars.clear();
         let found = match found {
             Err(TransitError::Arrived) => return Ok(None),
@@ -120,6 +131,19 @@ impl WayArgs {
         }
         tell(violations);
         Err(Broken(violations.len()).into())
+    }
+
+    /// What is around the robot at all stops of a program, in the floor frame, where that is said.
+    pub(super) fn around(
+        &self,
+        scans: &[PathBuf],
+        seed: u64,
+        bars: &Bars,
+    ) -> anyhow::Result<Option<Scene>> {
+        if self.demo.is_none() && scans.is_empty() {
+            return Ok(None);
+        }
+        scene(&self.scene, self.demo, scans, self.seed.unwrap_or(seed), bars).map(Some)
     }
 
     /// What is around the arm, in the floor frame.

@@ -3,10 +3,11 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError};
+use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError, Receiver};
 use nullsweep_ipc_types::{EventKind, JoinRule, PlanEvent, PlanId, Reason, Telemetry};
 
 use crate::link::pulse::{Lost, Pulse};
+use crate::link::site::Site;
 use crate::plan::{Held, Plan, PlanError};
 
 /// How a plan joins what is going on, as it is asked for on the command line.
@@ -128,43 +129,91 @@ pub fn publish(
     }
     .wire();
     while events.receive()?.is_some() {} // Older plans' events.
-    let mut pulse = Pulse::open(&ipc);
+    let pulse = Pulse::open(&ipc);
     let id = publisher.publish(&header, &knots)?;
+    let mut ear = Ear { id, events, pulse };
 
-    let mut wait = |limit: Duration, wanted: fn(EventKind) -> bool| {
-        let start = Instant::now();
-        while start.elapsed() < limit {
-            while let Some(event) = events.receive()? {
-                if event.plan == id {
-                    watcher.event(&event);
-                    if EventKind::from_wire(event.kind).is_some_and(wanted) {
-                        return Ok::<_, PublishError>(Some(event));
-                    }
-                }
-            }
-            if let Some(lost) = pulse.look()? {
-                return Err(PublishError::Lost(Box::new(lost)));
-            }
-            if let Some(telemetry) = pulse.last() {
-                watcher.progress(telemetry);
-            }
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        Ok(None)
-    };
     let is_admission = |k| matches!(k, EventKind::Accepted | EventKind::Rejected);
-    let admission = wait(patience.admission, is_admission)?
+    let admission = ear
+        .wait(patience.admission, is_admission, watcher)?
         .ok_or(PublishError::NoAdmission(patience.admission))?;
     if admission.kind == EventKind::Rejected.wire() {
         return Err(PublishError::Rejected(Box::new(admission)));
     }
     let Some(limit) = patience.end else { return Ok(id) };
-    let is_end = |k| matches!(k, EventKind::Finished | EventKind::Superseded | EventKind::Aborted);
-    let end = wait(limit, is_end)?.ok_or(PublishError::NoEnd(limit))?;
+    let end = ear.wait(limit, is_end, watcher)?.ok_or(PublishError::NoEnd(limit))?;
     if end.kind == EventKind::Finished.wire() {
         Ok(id)
     } else {
         Err(PublishError::EndedEarly(Box::new(end)))
+    }
+}
+
+/// What became of a plan that was published before, maybe by a process that is no more; one that runs is
+/// waited for. `None` where the executor knows nothing of it: another one has taken its place, or has had
+/// too many plans since.
+///
+/// # Errors
+/// No executor, one that was lost, or a plan that does not end in time: see [`PublishError`].
+pub fn fate(
+    id: PlanId,
+    site: Site<'_>,
+    patience: Patience,
+    watcher: &mut dyn Watcher,
+) -> Result<Option<PlanEvent>, PublishError> {
+    let ipc = Ipc::open(site.robot, site.root)?;
+    // Who comes late gets the last events.
+    let events = ipc.event_receiver()?;
+    let running = newest_telemetry(&ipc, patience.admission)?.plan == id;
+    let mut ear = Ear { id, events, pulse: Pulse::open(&ipc) };
+    if running {
+        let limit = patience.end.unwrap_or(Duration::MAX);
+        return ear.wait(limit, is_end, watcher)?.ok_or(PublishError::NoEnd(limit)).map(Some);
+    }
+    ear.wait(HISTORY, is_end, watcher)
+}
+
+/// How long an executor's last events may take to come.
+const HISTORY: Duration = Duration::from_millis(500);
+
+fn is_end(kind: EventKind) -> bool {
+    matches!(kind, EventKind::Finished | EventKind::Superseded | EventKind::Aborted)
+}
+
+/// Listens for what becomes of a plan.
+struct Ear<'a> {
+    id: PlanId,
+    events: Receiver<PlanEvent>,
+    pulse: Pulse<'a>,
+}
+
+impl Ear<'_> {
+    /// The first event of a wanted kind; `None` where none comes in time.
+    fn wait(
+        &mut self,
+        limit: Duration,
+        wanted: fn(EventKind) -> bool,
+        watcher: &mut dyn Watcher,
+    ) -> Result<Option<PlanEvent>, PublishError> {
+        let start = Instant::now();
+        while start.elapsed() < limit {
+            while let Some(event) = self.events.receive()? {
+                if event.plan == self.id {
+                    watcher.event(&event);
+                    if EventKind::from_wire(event.kind).is_some_and(wanted) {
+                        return Ok(Some(event));
+                    }
+                }
+            }
+            if let Some(lost) = self.pulse.look()? {
+                return Err(PublishError::Lost(Box::new(lost)));
+            }
+            if let Some(telemetry) = self.pulse.last() {
+                watcher.progress(telemetry);
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        Ok(None)
     }
 }
 

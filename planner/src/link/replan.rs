@@ -6,19 +6,15 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use nullsweep_ipc_types::ports::{Ipc, IpcError, PortError, Receiver};
-use nullsweep_ipc_types::{
-    CommandKind, JointArray, Mode, PlanEvent, PlanId, Reason, Telemetry, Verdict,
-};
+use nullsweep_ipc_types::{CommandKind, Mode, PlanEvent, PlanId, Reason, Telemetry, Verdict};
 use nullsweep_robot::{JointVector, MAX_DOF};
 
+use crate::link::place::{BRAKING_NS, Off, runs};
 use crate::link::publish::{Join, Patience, PublishError, Watcher, newest_telemetry, publish};
 use crate::link::pulse::Pulse;
 use crate::link::site::Site;
 use crate::plan::Plan;
 
-/// How far the arm may be commanded from the plan that it is said to run: cubic segments leave the
-/// straight line between two knots by less. \[rad\] or \[m\]
-const ON_PLAN: f64 = 0.05;
 /// How long the arm may take to come to rest.
 const STOP: Duration = Duration::from_secs(10);
 /// How long planning is taken to take where nobody says it, and the share of what is left to run that
@@ -27,10 +23,6 @@ const LEAD: Duration = Duration::from_secs(10);
 const SHARE: f64 = 0.5;
 /// What planning once more is taken to take: so many times what it took, and so much more.
 const AGAIN: (f64, Duration) = (1.25, Duration::from_secs(1));
-/// How far on in its plan a stopped arm may be than it was told to be: a fault brakes on the path after
-/// its plan has ended.
-const BRAKING_NS: u64 = 2_000_000_000;
-
 /// What is to be replaced, and when.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
@@ -76,32 +68,6 @@ impl fmt::Display for Replanned {
                 write!(f, "plan {plan} goes on from where the arm was stopped, past knot {knot}")
             }
         }
-    }
-}
-
-/// A joint that is not where a plan has it in the segment behind a knot. \[rad\] or \[m\]
-#[derive(Clone, Debug, PartialEq)]
-pub struct Off {
-    /// Its name.
-    pub joint: String,
-    /// Where it is commanded.
-    pub commanded: f64,
-    /// The knot.
-    pub knot: usize,
-    /// Least position of the joint there.
-    pub low: f64,
-    /// Greatest position of the joint there.
-    pub high: f64,
-}
-
-impl fmt::Display for Off {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { joint, commanded, knot, low, high } = self;
-        let next = knot + 1;
-        write!(
-            f,
-            "{joint} is commanded to {commanded:.4}, knots {knot} and {next} have it in {low:.4} … {high:.4}"
-        )
     }
 }
 
@@ -249,23 +215,6 @@ fn held(plan: &Plan, now: &Telemetry, from: Option<usize>) -> Result<Start, Repl
     Ok(Start::Held { knot, at })
 }
 
-/// Whether the arm is commanded to where this plan has it in this knot's segment.
-fn runs(plan: &Plan, at: &JointArray, knot: usize) -> Result<(), Off> {
-    let knot = knot.min(plan.knots.len().saturating_sub(2));
-    let Some([a, b]) = plan.knots.get(knot..knot + 2) else { return Ok(()) };
-    for (j, name) in plan.joints.iter().enumerate().take(MAX_DOF) {
-        let (low, high) = (a.q[j].min(b.q[j]), a.q[j].max(b.q[j]));
-        // Whole turns of a continuous joint make no difference.
-        let turns = (at[j] - 0.5 * (low + high)) / std::f64::consts::TAU;
-        let commanded = at[j] - turns.round() * std::f64::consts::TAU;
-        if !(low - ON_PLAN..=high + ON_PLAN).contains(&commanded) {
-            let joint = name.clone();
-            return Err(Off { joint, commanded, knot, low, high });
-        }
-    }
-    Ok(())
-}
-
 /// The first knot that is not reached within `lead` at full speed, before the last one: there nothing
 /// would be left to replace.
 fn knot_ahead(plan: &Plan, time_ns: u64, lead: Duration) -> Result<usize, ReplanError> {
@@ -335,7 +284,6 @@ fn look(
 
 #[cfg(test)]
 mod tests {
-    use nullsweep_ipc_types::MAX_JOINTS;
     use nullsweep_robot::Tool;
 
     use super::*;
@@ -393,18 +341,6 @@ mod tests {
             let error = ahead(time_s, lead_s).expect_err("it ends before").to_string();
             assert!(error.contains(&format!("ends in {:.1} s", 9.0 - time_s)), "{error}");
         }
-    }
-
-    #[test]
-    fn another_plan_is_told_apart() {
-        let plan = plan();
-        let mut at = [0.0; MAX_JOINTS];
-        at[0] = 0.35;
-        runs(&plan, &at, 3).expect("on the plan");
-        at[0] += 3.0 * std::f64::consts::TAU;
-        runs(&plan, &at, 3).expect("as far, whole turns on");
-        let error = runs(&plan, &at, 7).expect_err("elsewhere");
-        assert_eq!(error.knot, 7, "{error}");
     }
 
     #[test]

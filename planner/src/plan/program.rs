@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
 use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::xxh3_64;
 
 use super::error::{PROGRAM_FORMAT, PlanError};
 use super::file::Plan;
@@ -169,6 +170,12 @@ impl Program {
     pub fn check_seal(&self) -> Result<(), PlanError> {
         self.works().try_for_each(|(_, work)| work.plan.check_seal())?;
         self.seal.as_ref().ok_or(PlanError::Unverified)?.check(&self.seal_now())
+    }
+
+    /// A checksum of all of it as its file holds it.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        xxh3_64(&serde_json::to_vec(self).unwrap_or_default())
     }
 
     /// Of all but the plans' insides, which are sealed by themselves, but with their seals.

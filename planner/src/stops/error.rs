@@ -18,7 +18,7 @@ pub enum StopsError {
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
     /// What was begun is of another scene.
-    #[error("the jobs were made for another scan, or for other patches of it")]
+    #[error("what was begun was made for another scan, or for other patches of it")]
     OtherScene,
     /// From nowhere anything is reached.
     #[error(

@@ -123,10 +123,10 @@ fn is_of_the_place(error: &PipelineError) -> bool {
 
 /// Keeps what is told.
 #[derive(Default)]
-struct Notes(Mutex<Vec<String>>);
+pub(super) struct Notes(Mutex<Vec<String>>);
 
 impl Notes {
-    fn told(self) -> Vec<String> {
+    pub(super) fn told(self) -> Vec<String> {
         self.0.into_inner().unwrap_or_default()
     }
 }

@@ -24,10 +24,15 @@ pub enum Hardware {
     name = "demo",
     version,
     after_help = "Exit codes: 0 both plans passed their check, the swap took place, the endpoint \
-                  saw nothing wrong, and what was measured covers what was planned; 1 one of them \
+                  saw nothing wrong, and what was measured covers what was planned, or, with --whole, \
+                  the program was resumed both times and swept what it promised; 1 one of them \
                   is not so; 2 the demo failed; 77 what --hardware needs is not installed."
 )]
 pub(super) struct Args {
+    /// Sweep a whole chair instead, from three places by both arms, and kill who works through the program
+    /// and an executor on the way; with the mock's joints behind a stiff position loop
+    #[arg(long, conflicts_with_all = ["hardware", "fidelity", "base", "torso"])]
+    pub(super) whole: bool,
     /// What stands in for the robot
     #[arg(long, value_enum, default_value = "mock")]
     pub(super) hardware: Hardware,

@@ -5,16 +5,18 @@ mod args;
 mod hardware;
 mod outcome;
 mod table;
+mod whole;
 
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::ValueEnum;
 use nullsweep_ipc_types::{EventKind, Mode, PlanId, Telemetry};
 use nullsweep_planner::plan::Plan;
+use serde::Serialize;
 
 use crate::latency::of_buckets;
 use crate::parts;
@@ -39,8 +41,13 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(args) => args,
         Err(code) => return code,
     };
-    match run(&args) {
-        Ok(outcome) if outcome.checks.iter().all(|c| c.ok) => ExitCode::SUCCESS,
+    let checks = if args.whole {
+        run(&args, whole::perform, whole::text).map(|outcome| outcome.checks)
+    } else {
+        run(&args, perform, table::text).map(|outcome| outcome.checks)
+    };
+    match checks {
+        Ok(checks) if checks.iter().all(|c| c.ok) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
             eprintln!("demo: {error:#}");
@@ -49,7 +56,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-fn run(args: &Args) -> anyhow::Result<Outcome> {
+fn run<O: Serialize>(
+    args: &Args,
+    perform: fn(&Args, &Stage) -> anyhow::Result<O>,
+    text: fn(&O) -> String,
+) -> anyhow::Result<O> {
     args.hardware.check(args)?;
     let outcome = Stage::with(args.keep.as_deref(), |stage| perform(args, stage))?;
     match &args.json {
@@ -60,9 +71,9 @@ fn run(args: &Args) -> anyhow::Result<Outcome> {
             let file = File::create(path)
                 .with_context(|| format!("cannot write the figures to {}", path.display()))?;
             serde_json::to_writer_pretty(file, &outcome)?;
-            println!("{}", table::text(&outcome));
+            println!("{}", text(&outcome));
         }
-        None => println!("{}", table::text(&outcome)),
+        None => println!("{}", text(&outcome)),
     }
     Ok(outcome)
 }
@@ -98,7 +109,7 @@ fn perform(args: &Args, stage: &Stage) -> anyhow::Result<Outcome> {
     let mut publisher = start_publish(stage, "second", &["--wait"])?;
     let (new, accepted) = system.until(|w| accepted(w, old))?;
     let patience = Duration::from_secs_f64(60.0 + 3.0 * second.figures.task_time_s);
-    finish(&mut publisher, patience)?;
+    publisher.succeed(patience)?;
     system.until(|w| w.mode(Mode::Hold))?;
     let telemetry = system.until(|w| w.see("a last snapshot", |_| true))?;
 
@@ -160,7 +171,7 @@ fn plan(
     options.extend(["--json".into(), figures.clone().into()]);
     options.extend(more.iter().cloned());
     let mut planner = stage.start(Part::Planner, &format!("planner-{name}"), options)?;
-    finish(&mut planner, PLANNING)?;
+    planner.succeed(PLANNING)?;
     let text = fs::read(&figures).with_context(|| format!("no {}", figures.display()))?;
     let figures = serde_json::from_slice(&text).context("the planner's figures")?;
     Ok(Planned { method, cost, figures })
@@ -185,18 +196,7 @@ fn start_publish(stage: &Stage, name: &str, more: &[&str]) -> anyhow::Result<Pro
 }
 
 fn publish(stage: &Stage, name: &str, patience: Duration, more: &[&str]) -> anyhow::Result<()> {
-    finish(&mut start_publish(stage, name, more)?, patience)
-}
-
-/// Waits for a process that must end well.
-fn finish(process: &mut Process, patience: Duration) -> anyhow::Result<()> {
-    match process.wait(patience)? {
-        Some(status) if status.success() => Ok(()),
-        Some(status) => {
-            bail!("{} failed ({status}): {}", process.name(), process.last_words())
-        }
-        None => bail!("{} did not end within {} s", process.name(), patience.as_secs()),
-    }
+    start_publish(stage, name, more)?.succeed(patience)
 }
 
 /// The plan that was answered after `old` began, and the telemetry of that moment.

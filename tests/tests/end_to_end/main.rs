@@ -5,6 +5,7 @@ mod common;
 mod follow;
 mod kill;
 mod mock;
+mod program;
 mod publish;
 mod reject;
 mod replan;
