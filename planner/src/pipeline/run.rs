@@ -5,17 +5,17 @@ use nullsweep_robot::{Arm, JointVector, Robot};
 use nullsweep_surface::{Patch, Scan, patches};
 use rayon::prelude::*;
 
-use super::attempt::{Attempt, Planning};
+use super::attempt::{Attempt, Planning, Visit};
 use super::choice::{Made, made};
 use super::clock::Clock;
 use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
-use super::left_out::{Known, LeftOut, in_words, left_out};
+use super::left_out::{Known, LeftOut, in_words, left_out, missed_by};
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
-use super::swept::{points_of, swept_before, without_swept};
+use super::swept::{points_of, swept_before, with_spared, without_swept};
 use crate::cost;
 use crate::motion::Memo;
 use crate::plan::Plan;
@@ -42,6 +42,12 @@ pub struct Outcome {
     pub reached: Vec<bool>,
     /// The graph.
     pub graph: Graph,
+    /// What the arm may collide with.
+    pub world: World,
+    /// Where the arm is before the first motion.
+    pub start: JointVector,
+    /// The stops of the plan with the ways to them, before they were made fair and timed.
+    pub visits: Vec<Visit>,
 }
 
 /// Plans the job for a scene in the floor frame.
@@ -60,8 +66,7 @@ pub fn run(
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
-    let all = clock.time("patches", || patches_of(scene, job))?;
-    let all = without_swept(all, &job.spared);
+    let all = without_swept(clock.time("patches", || patches_of(scene, job))?, &job.spared);
     if all.is_empty() {
         return Err(PipelineError::AllSpared);
     }
@@ -74,8 +79,7 @@ pub fn run(
         progress.note(note);
     }
     let (start, rest) = begin(job, &arm, &world, progress)?;
-    let mut already = swept_before(job, rest.as_ref(), &arm, scan)?;
-    already.iter_mut().zip(&job.spared).for_each(|(already, spared)| *already |= spared);
+    let already = with_spared(swept_before(job, rest.as_ref(), &arm, scan)?, job);
 
     let cell = Workcell { arm: &arm, tool: &job.tool, world: &world };
     progress.stage("reach", Some(patches.len()));
@@ -111,42 +115,44 @@ pub fn run(
     progress.stage("verify", Some(plan.knots.len()));
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
     let verification = clock.time("verify", || verify(&plan, given, &|| progress.tick()))?;
-    let mut done = verification.swept.clone();
-    done.iter_mut().zip(&job.spared).for_each(|(done, spared)| *done |= spared);
-    let known = Known {
-        scan,
-        patches: &found,
-        reachable: &reachable,
-        dropped: &sequence.dropped,
-        swept: &done,
-    };
+    let done = with_spared(verification.swept.clone(), job);
+    let dropped = &sequence.dropped;
+    let known = Known { scan, patches: &found, reachable: &reachable, dropped, swept: &done };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
     let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
     plan.left = left_out.iter().map(LeftOut::told).collect();
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {
-        points: scan.points.len(),
         patches: found.len(),
         left_out,
+        missed: missed_by(&plan, &done, &arm),
         reachable: reachable.iter().filter(|r| **r).count(),
         fill_in_patches: patches.len() - found.len() - strokes - places,
         places,
         strokes,
-        base: stance.base,
-        base_height_m: stance.height,
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
         passes: passes(scan, plan.trajectory(), &arm),
         tool_speed: job.tool_speed.map(|speed| Held::of(plan.trajectory(), &arm, speed)),
         verification,
-        seed: job.seed,
         ..figures(&plan, &arm, &graph, &sequence)
     };
     reachable.resize(patches.len(), true);
-    let scan = here.surface;
-    Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
+    let (scan, visits) = (here.surface, sequence.visits);
+    Ok(Outcome {
+        plan,
+        figures,
+        arm,
+        scan,
+        patches,
+        reached: reachable,
+        graph,
+        world,
+        start,
+        visits,
+    })
 }
 
 /// The patches of a scene as the pad lies on them, in its frame: what a plan visits.

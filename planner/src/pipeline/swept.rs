@@ -40,6 +40,12 @@ pub(super) fn swept_before(
     Ok(coverage::swept_by(scan, followed.iter().map(Stretch::trajectory), arm))
 }
 
+/// What is swept with what need not be.
+pub(super) fn with_spared(mut swept: Vec<bool>, job: &Job) -> Vec<bool> {
+    swept.iter_mut().zip(&job.spared).for_each(|(swept, spared)| *swept |= spared);
+    swept
+}
+
 /// Share of a patch's points from which on it counts as swept.
 pub(super) const SWEPT_SHARE: f64 = 0.9;
 

@@ -134,7 +134,7 @@ const WITH_POSES: &[&str] = &[
 /// The same for those who make many plans of one scene.
 #[rustfmt::skip]
 const WITH_PIPELINE: &[&str] = &[
-    "progress", "cost", "workcell", "plan", "roadmap", "sweep",
+    "progress", "cost", "cover", "workcell", "plan", "roadmap", "sweep",
     "tour", "motion", "fairing", "timing", "verify", "link", "pipeline",
 ];
 
@@ -142,6 +142,7 @@ const PLANNER: &[(&str, &[&str])] = &[
     // 0
     ("progress", &[]),
     ("cost", &[]),
+    ("cover", &[]),
     // 1
     ("workcell", &["progress", "cost"]),
     // 2
@@ -162,7 +163,8 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("task", WITH_POSES),
     ("follow", WITH_POSES),
     ("transit", BELOW_4),
-    // 5: many plans
+    // 5: many plans, and how far one is from the best
+    ("bounds", WITH_PIPELINE),
     ("stops", WITH_PIPELINE),
 ];
 
