@@ -2,6 +2,7 @@
 
 mod advice;
 mod bars;
+mod bounds;
 pub mod calls;
 mod cell;
 mod choices;
