@@ -23,6 +23,7 @@
 //! one plain type to the next. Each can be called alone.
 
 pub mod cost;
+pub mod cover;
 pub mod progress;
 pub mod regions;
 
@@ -43,6 +44,7 @@ pub mod verify;
 pub mod link;
 pub mod poses;
 
+pub mod bounds;
 pub mod follow;
 pub mod pipeline;
 pub mod stops;

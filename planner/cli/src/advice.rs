@@ -62,7 +62,6 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
         transit(error)
     } else if let Some(error) = error.downcast_ref() {
         posture(error)
-<<<<<<< HEAD
     } else if let Some(VerifyError::OtherRegions { .. }) = error.downcast_ref() {
         Some("give --regions as it was given to `plan`".into())
     } else if let Some(RegionError::Nothing { .. }) = error.downcast_ref() {
@@ -71,10 +70,8 @@ fn known(error: &(dyn Error + 'static)) -> Option<String> {
              the first scan file's own"
                 .into(),
         )
-=======
     } else if let Some(error) = error.downcast_ref() {
         journal(error).map(Into::into)
->>>>>>> program8
     } else if let Some(LevelError::NoPlane { .. }) = error.downcast_ref() {
         Some(
             "say how the scan stands: --up X,Y,Z (against gravity, in the file's frame) with \

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use clap::Args;
+use clap::{Args, Subcommand};
 use nullsweep_experiment::{self as experiment, Object, Plan, Setting};
 use nullsweep_planner::pipeline::{End, Job, StanceChoice};
 use nullsweep_planner::plan::Method;
@@ -14,18 +14,22 @@ use nullsweep_planner::workcell::stance::StanceSearch;
 use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
 
 use crate::bars::Bars;
+use crate::bounds::{self, BoundsArgs};
 use crate::choices::ObjectArg;
-use crate::exit::OK;
+use crate::exit::{OK, Usage};
 use crate::json::write_json;
 use crate::numbers::not_negative;
 use crate::output::{say_on, writable};
 use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(super) struct ExperimentArgs {
+    #[command(subcommand)]
+    other: Option<Other>,
     /// The paper's object, simulated; with --scan it says which table stands beside ours.
-    #[arg(value_enum, value_name = "OBJECT")]
-    paper_object: ObjectArg,
+    #[arg(value_enum, value_name = "OBJECT", required = true)]
+    paper_object: Option<ObjectArg>,
     /// A scan instead of the simulated object, several are joined; the paper's figures do not
     /// belong to it and are left out.
     #[arg(long = "scan", value_name = "FILE")]
@@ -58,17 +62,32 @@ pub(super) struct ExperimentArgs {
     json: bool,
 }
 
+#[derive(Debug, Subcommand)]
+enum Other {
+    /// How far plans are from the best ones: bounds of effort, time, pieces and coverage.
+    Bounds(Box<BoundsArgs>),
+}
+
 pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
+    match (&args.other, args.paper_object) {
+        (Some(Other::Bounds(bounds)), _) => bounds::run(bounds),
+        (None, Some(object)) => of_paper(args, object.into()),
+        (None, None) => Err(Usage("an object is wanted: chair or bobby-car".into()).into()),
+    }
+}
+
+/// The paper's tables.
+fn of_paper(args: &ExperimentArgs, object: Object) -> anyhow::Result<u8> {
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory)
             .with_context(|| format!("cannot make {}", directory.display()))?;
-        let name = name(args.paper_object.into());
+        let name = name(object);
         writable(&directory.join(format!("{name}.md")))?;
     }
     let bars = Bars::new();
     let robot = Robot::pr2();
     bars.stage("scan", None);
-    let demo = match Object::from(args.paper_object) {
+    let demo = match object {
         Object::Chair => Demo::Chair,
         Object::BobbyCar => Demo::BobbyCar,
     };
@@ -87,14 +106,14 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
     let setting = Setting::new(&robot, &scene.surface, &job)?;
     let title = match args.scans.first().and_then(|path| path.file_stem()) {
         Some(stem) => format!("Experiment: {}", stem.to_string_lossy()),
-        None => format!("Experiment: {}", name(args.paper_object.into())),
+        None => format!("Experiment: {}", name(object)),
     };
     let samples = match &args.ik_samples[..] {
-        [] => experiment::samples(args.paper_object.into()).to_vec(),
+        [] => experiment::samples(object).to_vec(),
         given => given.iter().map(|&n| n.max(1) as usize).collect(),
     };
     let plan = Plan {
-        object: args.scans.is_empty().then_some(args.paper_object.into()),
+        object: args.scans.is_empty().then_some(object),
         title,
         samples,
         repeats: args.repeats as usize,
@@ -118,7 +137,7 @@ pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
             let path = directory.join(file);
             std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
         };
-        let name = name(args.paper_object.into());
+        let name = name(object);
         write(&format!("{name}.md"), &tables)?;
         write(&format!("{name}.csv"), &experiment::csv(&report))?;
         write_json(&report, &directory.join(format!("{name}.json")))?;

@@ -3,7 +3,7 @@
 use comfy_table::Table;
 use nullsweep_planner::pipeline::Figures;
 use nullsweep_planner::regions::{Kind, RegionFigures};
-use nullsweep_planner::sweep::{self, JointPace, Pace};
+use nullsweep_planner::sweep::{self, JointPace, MissedPoints, Pace};
 use nullsweep_planner::verify::{Against, Verification};
 use nullsweep_planner::workcell::stance::told;
 use nullsweep_report as report;
@@ -156,6 +156,7 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
         rows.push(["not swept, by what is in the way".to_owned(), String::new()]);
         rows.extend(f.left_out.iter().map(|left| [format!("  {}", left.cause), left.to_string()]));
     }
+    rows.extend(missed_rows(&f.missed));
     let mut row = |name: &str, value: String| rows.push([name.to_owned(), value]);
     row("calculation", format!("{:.2} s", f.calc_time_total_s));
     for (stage, seconds) in &f.calc_time_s {
@@ -180,6 +181,18 @@ pub(super) fn pace_rows(p: &Pace) -> Vec<[String; 2]> {
     ]
     .map(|(name, value)| [name.to_owned(), value])
     .into()
+}
+
+/// Why reachable points are not swept, for people.
+pub(super) fn missed_rows(missed: &[MissedPoints]) -> Vec<[String; 2]> {
+    let heading = (!missed.is_empty())
+        .then(|| ["reachable, but not swept, by the pad's way".to_owned(), String::new()]);
+    let rows = missed.iter().map(|row| {
+        let points = if row.points == 1 { "point" } else { "points" };
+        let value = format!("{} {points}, {} of reachable", row.points, percent(row.share));
+        [format!("  {}", row.why), value]
+    });
+    heading.into_iter().chain(rows).collect()
 }
 
 /// How well a tool speed is held, for people.

@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use nullsweep_planner::cost::{Effort, of_path};
-use nullsweep_planner::plan::{Plan, Program};
-use nullsweep_planner::sweep::{DIP, Pace, Passes, passes_over};
+use nullsweep_planner::pipeline::missed_by;
+use nullsweep_planner::plan::{Plan, Program, Stretch};
+use nullsweep_planner::sweep::{DIP, MissedPoints, Pace, Passes, coverage, passes_over};
 use nullsweep_planner::workcell::stance::told;
-use nullsweep_robot::MAX_DOF;
+use nullsweep_robot::{Arm, MAX_DOF};
 use serde::Serialize;
 
 use crate::exit::OK;
-use crate::figures::pace_rows;
+use crate::figures::{missed_rows, pace_rows};
 use crate::json::write_json;
 use crate::numbers::positive;
 use crate::output::{say, say_on};
@@ -62,6 +63,8 @@ struct Summary {
     pace: Option<Pace>,
     #[serde(flatten)]
     passes: Option<Passes>,
+    /// Reachable points that it does not sweep, by why; nothing where the plan is of another arm.
+    missed: Option<Vec<MissedPoints>>,
     continues_at_knot: Option<u32>,
     joints: Vec<JointSummary>,
     held: Vec<(String, f64)>,
@@ -80,8 +83,15 @@ pub(super) fn run(args: &InspectArgs) -> anyhow::Result<u8> {
         return of_program(args, &program);
     }
     let plan = Plan::read(&args.plan)?;
-    let (pace, passes) = paced(args, &plan)?.unzip();
-    let summary = Summary { pace, passes, ..summarise(&plan) };
+    let summary = match own_arm(args, &plan)? {
+        Some(arm) => {
+            let pace = Pace::of(plan.trajectory(), plan.begins_in_motion(), &arm, args.dip);
+            let passes = Passes::of(&passes_over(&plan.scan(), [plan.trajectory()], &arm));
+            let missed = Some(missed(&plan, &arm));
+            Summary { pace: Some(pace), passes: Some(passes), missed, ..summarise(&plan) }
+        }
+        None => summarise(&plan),
+    };
     match &args.json {
         Some(path) => write_json(&summary, path)?,
         None => say_on!("{}", tables(&summary)),
@@ -111,19 +121,25 @@ fn of_program(args: &InspectArgs, program: &Program) -> anyhow::Result<u8> {
     Ok(OK)
 }
 
-/// How fast the plan goes and how often it passes over a point, by the kinematics of the arm given;
-/// nothing where that is another one.
-fn paced(args: &InspectArgs, plan: &Plan) -> anyhow::Result<Option<(Pace, Passes)>> {
+/// The arm given, as the plan has it; nothing where that is another one.
+fn own_arm(args: &InspectArgs, plan: &Plan) -> anyhow::Result<Option<Arm>> {
     let arm = args.robot.arm()?;
     let is_own = plan.fingerprint == arm.fingerprint() && plan.joints == arm.joint_names();
     if !is_own || plan.knots.len() < 2 || plan.check_bounds().is_err() {
         return Ok(None);
     }
     let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
-    let arm = arm.with_held(&held)?;
-    let pace = Pace::of(plan.trajectory(), plan.begins_in_motion(), &arm, args.dip);
-    let passes = Passes::of(&passes_over(&plan.scan(), [plan.trajectory()], &arm));
-    Ok(Some((pace, passes)))
+    Ok(Some(arm.with_held(&held)?))
+}
+
+/// The reachable points that the plan and what led to it do not sweep; none of given poses.
+fn missed(plan: &Plan, arm: &Arm) -> Vec<MissedPoints> {
+    if plan.is_of_poses() {
+        return Vec::new();
+    }
+    let followed = plan.followed(plan.knots.len());
+    let motions = followed.iter().map(Stretch::trajectory);
+    missed_by(plan, &coverage::swept_by(&plan.scan(), motions, arm), arm)
 }
 
 fn summarise(plan: &Plan) -> Summary {
@@ -154,6 +170,7 @@ fn summarise(plan: &Plan) -> Summary {
         effort_rad: of_path(&Effort, &path),
         pace: None,
         passes: None,
+        missed: None,
         continues_at_knot: plan.continues.as_ref().map(|c| c.knot),
         joints: joints.collect(),
         held: plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
@@ -185,6 +202,9 @@ fn tables(s: &Summary) -> String {
     if let Some(passes) = &s.passes {
         let value = format!("{:.0}, {:.0}", passes.passes_p50, passes.passes_p95);
         plan.add_row(["passes over a point, p50, p95", &value]);
+    }
+    for [name, value] in s.missed.as_deref().map(missed_rows).unwrap_or_default() {
+        plan.add_row([name, value]);
     }
     if let Some(knot) = s.continues_at_knot {
         plan.add_row(["continues another plan at knot", &knot.to_string()]);

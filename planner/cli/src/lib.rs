@@ -3,6 +3,7 @@
 mod advice;
 mod again;
 mod bars;
+mod bounds;
 pub mod calls;
 mod cell;
 mod choices;

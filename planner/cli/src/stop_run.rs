@@ -326,6 +326,7 @@ impl Run<'_> {
             stance: Stance { base: plan.base, height: plan.base_height, held },
             tool: plan.tool.clone(),
             plan: None,
+            unwinds: false,
         };
         let [x, y, _] = plan.base;
         let (here, _) = scene.near([x, y], self.program.near_m);

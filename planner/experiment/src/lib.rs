@@ -1,6 +1,7 @@
 //! The paper's experiments (§V): its three methods on its two objects, in its own model and in
-//! ours.
+//! ours; and how far plans are from the best ones.
 
+mod bounds;
 mod figures;
 mod methods;
 mod paper;
@@ -8,6 +9,7 @@ mod report;
 mod setting;
 mod tables;
 
+pub use bounds::{Bounded, Gap, bounded, bounds_markdown};
 pub use figures::{FigureError, write as draw};
 pub use methods::{MethodRun, PathFigures, Task, V_MAX, by_cost, plan};
 pub use paper::{Published, cannot_hold, cell, samples};

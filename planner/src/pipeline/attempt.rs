@@ -68,10 +68,14 @@ pub(super) struct Sequence {
 }
 
 /// A stop of the arm with the way to it.
-pub(super) struct Visit {
-    pub(super) patch: usize,
-    pub(super) sample: Sample,
-    pub(super) leg: Leg,
+#[derive(Clone, Debug)]
+pub struct Visit {
+    /// The patch.
+    pub patch: usize,
+    /// The joint vector there.
+    pub sample: Sample,
+    /// How the arm comes there from the stop before, or from where it starts.
+    pub leg: Leg,
 }
 
 impl Sequence {

@@ -11,7 +11,7 @@ use super::rounds::RoundFigures;
 use crate::cost::{self, Effort};
 use crate::plan::Plan;
 use crate::roadmap::Graph;
-use crate::sweep::{DIP, Held, Pace, Passes};
+use crate::sweep::{DIP, Held, MissedPoints, Pace, Passes};
 use crate::verify::Verification;
 
 /// Every figure of a run.
@@ -64,6 +64,9 @@ pub struct Figures {
     pub dropped_patches: usize,
     /// What is not swept, by what is in the way.
     pub left_out: Vec<LeftOut>,
+    /// Reachable points that are not swept, by why the pad's motion leaves them.
+    #[serde(default)]
+    pub missed: Vec<MissedPoints>,
     /// How fast it goes.
     pub pace: Pace,
     /// How often it passes over what it sweeps.
@@ -86,6 +89,10 @@ pub struct Figures {
 pub(super) fn figures(plan: &Plan, arm: &Arm, graph: &Graph, sequence: &Sequence) -> Figures {
     let joints: Vec<JointVector> = plan.knots.iter().map(|k| k.q).collect();
     Figures {
+        points: plan.surface.len(),
+        base: plan.base,
+        base_height_m: plan.base_height,
+        seed: plan.seed,
         edge_candidates: graph.candidates,
         edges: graph.edges.len(),
         components: graph.components.len(),

@@ -2,12 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use nullsweep_robot::Arm;
 use nullsweep_surface::{Patch, Scan};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::other::FreeFrom;
-use crate::plan::Left;
+use crate::plan::{Left, Plan, Stretch};
+use crate::sweep::{MissedPoints, Unswept, missed};
 use crate::workcell::{Cause, Workcell, obstruction};
 
 /// All that one cause keeps from being swept.
@@ -136,6 +138,20 @@ pub(super) fn left_out(cell: Workcell<'_>, known: &Known<'_>) -> Vec<LeftOut> {
         .collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     found
+}
+
+/// The reachable points that a plan leaves, given which of its surface are swept, by why its pad's
+/// motion, and that of what led to it, does.
+#[must_use]
+pub fn missed_by(plan: &Plan, swept: &[bool], arm: &Arm) -> Vec<MissedPoints> {
+    let reachable: Vec<bool> = plan.surface.iter().map(|sample| sample.reachable).collect();
+    let told = Cause::NoMotion.to_string();
+    let points = plan.left.iter().filter(|left| left.cause == told).flat_map(|left| &left.points);
+    let no_motion: Vec<u32> =
+        points.copied().filter(|&i| (i as usize) < plan.surface.len()).collect();
+    let left = Unswept { reachable: &reachable, swept, no_motion: &no_motion };
+    let followed = plan.followed(plan.knots.len());
+    missed(&plan.scan(), left, followed.iter().map(Stretch::trajectory), arm)
 }
 
 /// The first few causes in a line, for an error.

@@ -21,10 +21,11 @@ mod setting;
 mod start;
 mod swept;
 
+pub use attempt::Visit;
 pub use error::PipelineError;
 pub use figures::Figures;
 pub use job::{After, End, Job, StanceChoice};
-pub use left_out::LeftOut;
+pub use left_out::{LeftOut, missed_by};
 pub use other::FreeFrom;
 pub use rounds::RoundFigures;
 pub use run::{Outcome, patches_of, run};

@@ -5,14 +5,14 @@ use nullsweep_robot::{Arm, JointVector, Robot};
 use nullsweep_surface::{Patch, Scan, patches};
 use rayon::prelude::*;
 
-use super::attempt::{Attempt, Planning};
+use super::attempt::{Attempt, Planning, Visit};
 use super::choice::Made;
 use super::clock::Clock;
 use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
-use super::left_out::{Known, LeftOut, in_words, left_out};
+use super::left_out::{Known, LeftOut, in_words, left_out, missed_by};
 use super::rounds::Course;
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
@@ -44,6 +44,12 @@ pub struct Outcome {
     pub reached: Vec<bool>,
     /// The graph.
     pub graph: Graph,
+    /// What the arm may collide with.
+    pub world: World,
+    /// Where the arm is before the first motion.
+    pub start: JointVector,
+    /// The stops of the plan with the ways to them, before they were made fair and timed.
+    pub visits: Vec<Visit>,
 }
 
 /// Plans the job for a scene in the floor frame.
@@ -62,8 +68,7 @@ pub fn run(
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
-    let all = clock.time("patches", || patches_of(scene, job))?;
-    let all = without_swept(all, &job.spared);
+    let all = without_swept(clock.time("patches", || patches_of(scene, job))?, &job.spared);
     if all.is_empty() {
         return Err(PipelineError::AllSpared);
     }
@@ -113,13 +118,8 @@ pub fn run(
     let given = Given { robot, arm: &job.arm, scene, collision: &job.collision };
     let verification = clock.time("verify", || verify(&plan, given, &|| progress.tick()))?;
     let done = course.done(&verification.swept);
-    let known = Known {
-        scan,
-        patches: &found,
-        reachable: &reachable,
-        dropped: &sequence.dropped,
-        swept: &done,
-    };
+    let dropped = &sequence.dropped;
+    let known = Known { scan, patches: &found, reachable: &reachable, dropped, swept: &done };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
     let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
     plan.left = left_out.iter().map(LeftOut::told).collect();
@@ -127,15 +127,13 @@ pub fn run(
     // A stroke leads to a place that has no points of its own.
     let strokes = patches[found.len()..].iter().filter(|patch| patch.points.is_empty()).count();
     let figures = Figures {
-        points: scan.points.len(),
         patches: found.len(),
         left_out,
+        missed: missed_by(&plan, &done, &arm),
         reachable: reachable.iter().filter(|r| **r).count(),
         fill_in_patches: patches.len() - found.len() - strokes - places,
         places,
         strokes,
-        base: stance.base,
-        base_height_m: stance.height,
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
@@ -143,12 +141,22 @@ pub fn run(
         rounds,
         tool_speed: job.tool_speed.map(|speed| Held::of(plan.trajectory(), &arm, speed)),
         verification,
-        seed: job.seed,
         ..figures(&plan, &arm, &graph, &sequence)
     };
     reachable.resize(patches.len(), true);
-    let scan = here.surface;
-    Ok(Outcome { plan, figures, arm, scan, patches, reached: reachable, graph })
+    let (scan, visits) = (here.surface, sequence.visits);
+    Ok(Outcome {
+        plan,
+        figures,
+        arm,
+        scan,
+        patches,
+        reached: reachable,
+        graph,
+        world,
+        start,
+        visits,
+    })
 }
 
 /// The patches of a scene as the pad lies on them, in its frame: what a plan visits.

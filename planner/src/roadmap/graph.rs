@@ -32,7 +32,11 @@ pub struct Graph {
 
 impl Graph {
     /// With these edges over the reached patches.
-    fn of(edges: Vec<Edge>, reached: &[Option<Sample>], apart: Vec<(usize, usize)>) -> Self {
+    pub(crate) fn of(
+        edges: Vec<Edge>,
+        reached: &[Option<Sample>],
+        apart: Vec<(usize, usize)>,
+    ) -> Self {
         let mut incident = vec![Vec::new(); reached.len()];
         for (i, e) in edges.iter().enumerate() {
             incident[e.a].push(i);

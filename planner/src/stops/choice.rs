@@ -2,10 +2,10 @@
 
 use nullsweep_surface::Patch;
 
-use super::cover::{Cover, Problem, cover};
 use super::floor::union;
 use super::share::Share;
 use super::survey::Site;
+use crate::cover::{Cover, Problem, cover};
 use crate::workcell::Stance;
 
 /// What a stop must gain to be worth the drive, as a share of all points.

@@ -21,7 +21,7 @@ pub fn swept(scan: &Scan, contact_poses: &[Isometry3<f64>], tool: &Tool) -> Vec<
 
 /// Calls `visit` with the index of each pose and of each point that the pad sweeps there, pose
 /// after pose.
-pub(super) fn visit_swept(
+pub(crate) fn visit_swept(
     scan: &Scan,
     contact_poses: &[Isometry3<f64>],
     tool: &Tool,

@@ -3,6 +3,7 @@
 
 pub mod coverage;
 mod held;
+mod missed;
 mod pace;
 mod pads;
 mod passes;
@@ -10,6 +11,7 @@ mod percentile;
 mod segment;
 
 pub use held::{Held, Slower};
+pub use missed::{Missed, MissedPoints, Unswept, missed};
 pub use pace::{DIP, JointPace, Pace};
 pub use pads::{Pad, contact_motion, pad_motion};
 pub use passes::{Passes, passes_over};

@@ -134,7 +134,7 @@ const WITH_POSES: &[&str] = &[
 /// The same for those who make many plans of one scene.
 #[rustfmt::skip]
 const WITH_PIPELINE: &[&str] = &[
-    "progress", "cost", "workcell", "plan", "roadmap", "sweep",
+    "progress", "cost", "cover", "workcell", "plan", "roadmap", "sweep",
     "tour", "motion", "fairing", "timing", "verify", "link", "pipeline",
 ];
 
@@ -143,6 +143,7 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("progress", &[]),
     ("cost", &[]),
     ("regions", &[]),
+    ("cover", &[]),
     // 1
     ("workcell", &["progress", "cost", "regions"]),
     // 2
@@ -163,7 +164,8 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("task", WITH_POSES),
     ("follow", WITH_POSES),
     ("transit", BELOW_4),
-    // 5: many plans
+    // 5: many plans, and how far one is from the best
+    ("bounds", WITH_PIPELINE),
     ("stops", WITH_PIPELINE),
 ];
 

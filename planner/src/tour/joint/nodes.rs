@@ -103,6 +103,16 @@ impl<'a, C: Cost> Metric<'a, C> {
         self.cost.of(&self.continuous.displacement(a, b))
     }
 
+    /// For each sample of `to` the cost of the straight motion from the nearest sample of `from`, in
+    /// single precision; a change of branch is counted.
+    #[must_use]
+    pub fn nearest(&self, from: &Cluster, to: &Cluster) -> Vec<f32> {
+        let mut out = vec![f32x8::splat(f32::INFINITY); to.eights()];
+        let labels = vec![0.0; from.samples.len()];
+        self.relax(from, &labels, 0.0, to, 0, &mut out);
+        out.into_iter().flat_map(f32x8::to_array).take(to.samples.len()).collect()
+    }
+
     /// Lowers `out`, the labels of `to` from its group `first` on, to what the labels of `from`
     /// allow: out[b] = min over a of labels[a] + extra + cost(a, b).
     pub(super) fn relax(
