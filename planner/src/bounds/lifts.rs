@@ -121,8 +121,9 @@ mod tests {
         let nodes: Vec<(usize, u8)> = (0..patches)
             .flat_map(|p| stops.samples[p].iter().map(move |s| (p, s.branch.0)))
             .collect();
-        let mut open: VecDeque<(usize, Option<(usize, u8)>, usize)> =
-            VecDeque::from([(0, None, 0)]);
+        // Pieces so far, the patch and the branch where the arm is, and what is visited.
+        type State = (usize, Option<(usize, u8)>, usize);
+        let mut open: VecDeque<State> = VecDeque::from([(0, None, 0)]);
         let mut seen = HashSet::new();
         while let Some((pieces, at, visited)) = open.pop_front() {
             if visited + 1 == 1 << patches {

@@ -116,6 +116,7 @@ mod tests {
             knots: (0..10).map(knot).collect(),
             patches: Vec::new(),
             surface: Vec::new(),
+            regions: Vec::new(),
             continues: None,
             past: Vec::new(),
             left: Vec::new(),
