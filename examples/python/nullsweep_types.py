@@ -455,3 +455,87 @@ class Response(ctypes.Structure):
 
 
 assert ctypes.sizeof(Response) == 56
+
+
+class BaseOrder(enum.IntEnum):
+    @property
+    def text(self):
+        return _TEXTS[type(self)][self]
+
+    STATUS = 0
+    DRIVE = 1
+    ARRIVED = 2
+
+
+class BaseState(enum.IntEnum):
+    @property
+    def text(self):
+        return _TEXTS[type(self)][self]
+
+    IDLE = 0
+    DRIVING = 1
+    ARRIVED = 2
+    FAILED = 3
+
+
+_TEXTS[BaseOrder] = {
+    BaseOrder.STATUS: "status",
+    BaseOrder.DRIVE: "drive",
+    BaseOrder.ARRIVED: "arrived",
+}
+_TEXTS[BaseState] = {
+    BaseState.IDLE: "idle",
+    BaseState.DRIVING: "driving",
+    BaseState.ARRIVED: "arrived",
+    BaseState.FAILED: "failed",
+}
+
+
+class BaseJoint(ctypes.Structure):
+    _fields_ = [
+        ("name", ctypes.c_uint8 * 64),
+        ("position", ctypes.c_double),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "nullsweep.BaseJoint.v1"
+
+
+assert ctypes.sizeof(BaseJoint) == 72
+
+
+class BaseCommand(ctypes.Structure):
+    _fields_ = [
+        ("goal", ctypes.c_uint64),
+        ("pose", ctypes.c_double * 3),
+        ("joints", BaseJoint * 32),
+        ("joint_count", ctypes.c_uint32),
+        ("order", ctypes.c_uint32),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "nullsweep.BaseCommand.v1"
+
+
+assert ctypes.sizeof(BaseCommand) == 2344
+
+
+class BaseStatus(ctypes.Structure):
+    _fields_ = [
+        ("stamp_ns", ctypes.c_uint64),
+        ("goal", ctypes.c_uint64),
+        ("pose", ctypes.c_double * 3),
+        ("verdict", ctypes.c_uint32),
+        ("state", ctypes.c_uint32),
+        ("measured", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "nullsweep.BaseStatus.v1"
+
+
+assert ctypes.sizeof(BaseStatus) == 56

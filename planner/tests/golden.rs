@@ -122,8 +122,8 @@ fn the_chair_is_planned_as_ever() {
                 ("tsp acceleration", 0x243fe27e92d3caf6),
                 ("curvature velocity", 0xc500d90e942bb1e7),
                 ("curvature acceleration", 0x2871a17296c80a4f),
-                ("joint velocity", 0x6982a9ea09876cac),
-                ("joint acceleration", 0x75209e31c4524993),
+                ("joint velocity", 0x7b0439ac88f7e939),
+                ("joint acceleration", 0xce1c665e9e9f976a),
             ],
         );
     }

@@ -10,6 +10,7 @@
 //! users on one machine run side by side.
 
 mod base;
+mod cause;
 mod clock;
 mod command;
 mod error;

@@ -13,7 +13,8 @@ use iceoryx2::prelude::{
 };
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::error::{Cause, IpcError};
+use super::cause::Cause;
+use super::error::IpcError;
 use super::owner::{Foreign, foreign};
 use super::spoilt;
 

@@ -1,7 +1,6 @@
 //! What the planner's choices are called on the command line.
 
 use clap::ValueEnum;
-use nullsweep_experiment::Object;
 use nullsweep_planner::link::publish::Join;
 use nullsweep_planner::plan::export::Format;
 use nullsweep_planner::plan::{CostKind, Method, Profile};
@@ -67,16 +66,6 @@ choices! {
         Csv,
         /// The message's fields by their names.
         Json,
-    }
-}
-
-choices! {
-    /// The paper's objects.
-    ObjectArg for Object {
-        /// Table I.
-        Chair,
-        /// Table II.
-        BobbyCar,
     }
 }
 

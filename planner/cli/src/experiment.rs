@@ -15,21 +15,30 @@ use nullsweep_robot::{ArmSpec, Robot, Side, Tool};
 
 use crate::bars::Bars;
 use crate::bounds::{self, BoundsArgs};
-use crate::choices::ObjectArg;
-use crate::exit::{OK, Usage};
+use crate::exit::OK;
 use crate::json::write_json;
 use crate::numbers::not_negative;
 use crate::output::{say_on, writable};
 use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(super) struct ExperimentArgs {
     #[command(subcommand)]
-    other: Option<Other>,
-    /// The paper's object, simulated; with --scan it says which table stands beside ours.
-    #[arg(value_enum, value_name = "OBJECT", required = true)]
-    paper_object: Option<ObjectArg>,
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// The paper's chair, simulated, beside its table I; with --scan that table stands beside a scan.
+    Chair(Box<PaperArgs>),
+    /// The paper's bobby car, simulated, beside its table II; with --scan that table stands beside a scan.
+    BobbyCar(Box<PaperArgs>),
+    /// How far plans are from the best ones: bounds of effort, time, pieces and coverage.
+    Bounds(Box<BoundsArgs>),
+}
+
+#[derive(Debug, Args)]
+struct PaperArgs {
     /// A scan instead of the simulated object, several are joined; the paper's figures do not
     /// belong to it and are left out.
     #[arg(long = "scan", value_name = "FILE")]
@@ -62,22 +71,16 @@ pub(super) struct ExperimentArgs {
     json: bool,
 }
 
-#[derive(Debug, Subcommand)]
-enum Other {
-    /// How far plans are from the best ones: bounds of effort, time, pieces and coverage.
-    Bounds(Box<BoundsArgs>),
-}
-
 pub(super) fn run(args: &ExperimentArgs) -> anyhow::Result<u8> {
-    match (&args.other, args.paper_object) {
-        (Some(Other::Bounds(bounds)), _) => bounds::run(bounds),
-        (None, Some(object)) => of_paper(args, object.into()),
-        (None, None) => Err(Usage("an object is wanted: chair or bobby-car".into()).into()),
+    match &args.what {
+        What::Chair(args) => of_paper(args, Object::Chair),
+        What::BobbyCar(args) => of_paper(args, Object::BobbyCar),
+        What::Bounds(args) => bounds::run(args),
     }
 }
 
 /// The paper's tables.
-fn of_paper(args: &ExperimentArgs, object: Object) -> anyhow::Result<u8> {
+fn of_paper(args: &PaperArgs, object: Object) -> anyhow::Result<u8> {
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory)
             .with_context(|| format!("cannot make {}", directory.display()))?;

@@ -55,7 +55,7 @@ mod view;
 mod views;
 mod way;
 
-pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ObjectArg, ProfileArg};
+pub use choices::{CostArg, FormatArg, JoinArg, MethodArg, ProfileArg};
 pub use exit::{FAILED, LOST, MORE_JOBS, OK, USAGE, VIOLATIONS};
 
 use std::ffi::OsString;

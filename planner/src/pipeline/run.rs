@@ -62,9 +62,7 @@ pub fn run(
     job: &Job,
     progress: &dyn Progress,
 ) -> Result<Outcome, PipelineError> {
-    if let Some(After { plan, .. }) = &job.after {
-        plan.check_bounds()?;
-    }
+    job.after.as_ref().map_or(Ok(()), |after| after.plan.check_bounds())?;
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);

@@ -128,8 +128,14 @@ pub(crate) fn call(command: &str) -> Option<(Vec<String>, Vec<String>)> {
     if whole(program).is_some() {
         return Some((vec![program.to_owned()], flags(rest)));
     }
-    let is_name = |word: &&&str| word.chars().all(|c| c.is_ascii_lowercase());
-    let deep = if rest.first().is_some_and(|word| ["cell", "ctl"].contains(word)) { 2 } else { 1 };
+    let is_name = |word: &&&str| {
+        !word.starts_with('-') && word.chars().all(|c| c.is_ascii_lowercase() || c == '-')
+    };
+    let deep = if rest.first().is_some_and(|word| ["cell", "ctl", "experiment"].contains(word)) {
+        2
+    } else {
+        1
+    };
     let below = rest.iter().filter(is_name).take(deep).map(ToString::to_string);
     Some((std::iter::once(program.to_owned()).chain(below).collect(), flags(rest)))
 }
