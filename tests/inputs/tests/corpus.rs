@@ -70,7 +70,7 @@ macro_rules! targets {
     };
 }
 
-targets! { plan wire urdf srdf recording scan poses tool gtsp mesh room register regions }
+targets! { plan wire urdf srdf recording scan poses tool regions gtsp mesh room register }
 
 /// The fuzzer has a target for each, and corpora belong to targets.
 #[test]
