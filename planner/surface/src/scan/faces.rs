@@ -8,11 +8,14 @@ use super::winding::Wound;
 /// points of such a mesh are, which is told of those.
 const MOST: f64 = 1_000_000.0;
 
+/// A face that is no wider than so many spacings is a line.
+const THIN: f64 = 0.2;
+
 /// The corners of a mesh and places on its faces, so close that no place of a face is farther than
 /// 0.58 `spacing` \[m\] from one of them, in an order that depends on the mesh alone.
 ///
-/// Faces are halved across their longest edge until no edge is longer than `spacing`: faces that
-/// share an edge share the places on it, and a sliver gets as many as it is long.
+/// Faces are halved across their longest edge until no edge is longer than `spacing`, or they are but
+/// lines.
 pub(super) fn places(vertices: &[Point3<f64>], wound: &Wound, spacing: f64) -> Vec<Point3<f64>> {
     let faces: Vec<[Point3<f64>; 3]> = wound
         .triangles
@@ -35,7 +38,13 @@ pub(super) fn places(vertices: &[Point3<f64>], wound: &Wound, spacing: f64) -> V
                 .into_iter()
                 .max_by(|x, y| length(x).total_cmp(&length(y)))
                 .expect("a face has three edges");
-            if length(&(from, to, tip)) > spacing * spacing {
+            let longest = length(&(from, to, tip)).sqrt();
+            let height = (to - from).cross(&(tip - from)).norm() / longest;
+            if height <= THIN * spacing {
+                // A line: halved, what is left of it would stay as long.
+                let parts = (longest / spacing).ceil();
+                places.extend((1..parts as usize).map(|i| from.lerp(&to, i as f64 / parts)));
+            } else if longest > spacing {
                 // The same place from either side.
                 let middle = Point3::from((from.coords + to.coords) * 0.5);
                 places.push(middle);
@@ -51,16 +60,20 @@ pub(super) fn places(vertices: &[Point3<f64>], wound: &Wound, spacing: f64) -> V
 
 /// The given spacing, or so many times twice as much that there are not too many places.
 fn bearable(faces: &[[Point3<f64>; 3]], spacing: f64) -> f64 {
+    let farthest = faces.iter().flatten().map(|p| p.coords.amax()).fold(0.0, f64::max);
+    // Far out there are no numbers between two places that are nearer to each other.
+    let mut spacing = spacing.max(1e-12 * farthest);
     let (mut area, mut length) = (0.0, 0.0);
     for [a, b, c] in faces {
         let (u, v) = (b - a, c - a);
         area += 0.5 * u.cross(&v).norm();
         length += u.norm().max(v.norm()).max((c - b).norm());
     }
-    let mut spacing = spacing;
     // Faces shorter than the spacing have no place but their corners.
-    let too_many = |s: f64| 3.0 * area / (s * s) + (length / s - faces.len() as f64) > MOST;
-    while too_many(spacing) && spacing.is_finite() {
+    let places = |s: f64| 3.0 * area / (s * s) + length / s - faces.len() as f64;
+    // What is no number is too much.
+    let is_bearable = |s: f64| places(s) <= MOST;
+    while !is_bearable(spacing) && spacing.is_finite() {
         spacing *= 2.0;
     }
     spacing
@@ -100,5 +113,15 @@ mod tests {
         let wound = Wound { turned: vec![false], closed: vec![false], triangles };
         let found = places(&vertices, &wound, 0.003).len();
         assert!((1_000..=1_000_000).contains(&found), "{found}");
+        // Beyond all numbers, and where neighbouring ones are farther apart than the spacing.
+        for corners in [
+            [[0.0, 0.0, 0.0], [1e200, 1e200, 0.0], [0.0, -1e200, 1e200]],
+            [[1e20, 0.0, 0.0], [1e20 + 2e4, 0.0, 0.0], [1e20 + 4e4, 0.0, 0.0]],
+            [[1e15, 0.0, 0.0], [1e15 + 1.0, 1.0, 0.0], [1e15, 2.0, 1.0]],
+            [[0.0, 0.0, 0.0], [0.0, 849_152.6, 0.0], [552.7, 0.0, 1.7e25]],
+        ] {
+            let vertices: Vec<Point3<f64>> = corners.map(Point3::from).into();
+            assert!(places(&vertices, &wound, 0.003).len() <= 2_000_000);
+        }
     }
 }
