@@ -134,7 +134,7 @@ fn arrived(system: &SystemArgs) -> anyhow::Result<ExitCode> {
     let words = match verdict {
         Some(Verdict::Accepted) => {
             let [x, y, yaw] = status.pose;
-            format!("accepted; the base is taken to stand at {x:.3},{y:.3},{yaw:.3}")
+            format!("accepted; the base is taken to stand at {x:.3} m, {y:.3} m, {yaw:.3} rad")
         }
         Some(Verdict::WrongMode) => {
             "not accepted: what drives the base tells by itself when it has arrived".to_owned()

@@ -12,7 +12,7 @@ const TERMS: Terms = Terms {
     name: BASE,
     clients: BASE_CLIENTS,
     requests: BASE_REQUESTS,
-    absent: |robot, _| IpcError::NoBase { robot },
+    absent: |robot, root| IpcError::NoBase { robot, root },
     mute: |robot, millis| IpcError::MuteBase { robot, millis },
 };
 

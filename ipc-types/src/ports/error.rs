@@ -26,10 +26,16 @@ pub enum IpcError {
         root: Option<PathBuf>,
     },
     /// Nothing moves this robot's base, and nobody waits for it.
-    #[error("nothing answers for the base of robot `{robot}`, and no program waits for it")]
+    #[error(
+        "nothing answers for the base of robot `{robot}` under {}, and no program waits for it: \
+         `planner publish PROGRAM` does, by the same --robot-name and --ipc-root",
+        shown(.root)
+    )]
     NoBase {
         /// The robot's name.
         robot: String,
+        /// The root path, `None` for the default.
+        root: Option<PathBuf>,
     },
     /// What moves the base did not answer in time.
     #[error("what moves the base of robot `{robot}` did not answer within {millis} ms")]

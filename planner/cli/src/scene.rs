@@ -59,25 +59,30 @@ impl SceneArgs {
         Self { object, ..self.clone() }
     }
 
-    /// The solid things that are placed.
+    /// Whether solid things are placed.
     pub(super) fn has_obstacles(&self) -> bool {
         self.obstacles.is_some()
     }
 
+    /// The solid things that are placed.
     pub(super) fn obstacles(&self) -> anyhow::Result<Vec<Obstacle>> {
         self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)
     }
 
     /// What is placed, and nothing measured.
     pub(super) fn unscanned(&self, floor: Obstacle) -> anyhow::Result<Scene> {
-        let mut obstacles = vec![floor];
-        obstacles.extend(self.obstacles()?);
+        self.beside(Scene::of_obstacles(vec![floor]))
+    }
+
+    /// A scene that is known otherwise than by scans, with what is placed beside it.
+    pub(super) fn beside(&self, mut scene: Scene) -> anyhow::Result<Scene> {
+        scene.obstacles.extend(self.obstacles()?);
         let nothing = Around {
             scan: &PlacedScan::default(),
             scan_to_floor: Isometry3::identity(),
             seed: room::SEED,
         };
-        with_regions(Scene::of_obstacles(obstacles), self.regions.as_deref(), &nothing)
+        with_regions(scene, self.regions.as_deref(), &nothing)
     }
 
     /// How the scans stand.

@@ -131,7 +131,7 @@ fn wound(arm: &Arm, now: &Posture) -> Vec<String> {
     let joints = arm.joint_names().iter().enumerate();
     let turning = joints.filter(|(j, _)| arm.continuous().is(*j));
     let wound = turning.filter_map(|(j, name)| {
-        let turns = (now.q[j] / std::f64::consts::TAU).round();
+        let turns = (now.q[j] / std::f64::consts::TAU).trunc();
         let s = if turns.abs() == 1.0 { "" } else { "s" };
         (turns != 0.0).then(|| {
             format!("{name} by {turns:+.0} turn{s}: `planner goto home --unwind` turns it back")

@@ -149,7 +149,7 @@ impl Run<'_> {
                  `executor ctl arrived`"
             );
         }
-        let stands = mover.drive(stop, &mut |_| ())?;
+        let stands = mover.drive(stop)?;
         self.journal.arrived(s, stands)?;
         self.stood(s, stands, true)
     }

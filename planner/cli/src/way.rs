@@ -155,23 +155,19 @@ impl WayArgs {
             )
             .into());
         }
-        let is_bare = self.demo.is_none() && way.scans.is_empty();
-        if self.empty || (is_bare && self.scene.has_obstacles()) {
+        if self.empty {
             if way.plan.is_some_and(Plan::is_of_poses) && !self.scene.has_obstacles() {
                 bars.note(
                     "a plan of given poses does not say what stood around it: give its --obstacles \
                      again, or they are driven through",
                 );
             }
-            let mut scene = swept.map_or_else(Scene::empty, surface_of);
-            scene.obstacles.extend(self.scene.obstacles()?);
-            return Ok(scene);
+            return self.scene.beside(swept.map_or_else(Scene::empty, surface_of));
         }
-        if is_bare {
+        if self.demo.is_none() && way.scans.is_empty() {
             return Err(Usage(
-                "what is around the arm? Give the scans (as they were given to `plan`), --demo, \
-                 --obstacles FILE, or --empty where nothing is there but the floor and what the plan \
-                 sweeps"
+                "what is around the arm? Give the scans (as they were given to `plan`), --demo, or \
+                 --empty where nothing is there but the floor, what the plan sweeps, and --obstacles"
                     .into(),
             )
             .into());

@@ -1,5 +1,7 @@
 //! `planner replan` by what was measured: only what is left is swept.
 
+mod common;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,8 +9,10 @@ use std::process::Command;
 use bytemuck::Zeroable as _;
 use nullsweep_ipc_types::PlanId;
 use nullsweep_planner::plan::Plan;
-use nullsweep_recording::{self as recording, CycleRecord, MAGIC, MeasuredRecord, PlanRecord, Tag};
+use nullsweep_recording::{self as recording, CycleRecord, MAGIC, MeasuredRecord, Tag};
 use nullsweep_surface::simulate;
+
+use common::{planned, put_plan};
 
 /// A part of the simulated chair's seat, and where the robot stands before it.
 const SMALL: [&str; 9] = [
@@ -53,27 +57,18 @@ fn flight(folder: &Path, plan: &Plan, share: f64) -> PathBuf {
     let id = PlanId { epoch: 1, number: 7 };
     let mut bytes = MAGIC.to_vec();
     recording::put(&mut bytes, Tag::Guard, &[b"limits"]);
-    let head = PlanRecord { id, ..PlanRecord::zeroed() };
-    let knots: Vec<recording::PlanKnot> = plan
-        .knots
-        .iter()
-        .map(|k| recording::PlanKnot { time: k.time_ns as f64, q: k.q, v: k.v, ramp: 0.0 })
-        .collect();
-    let parts: [&[u8]; 2] = [bytemuck::bytes_of(&head), bytemuck::cast_slice(&knots)];
-    recording::put(&mut bytes, Tag::Plan, &parts);
+    put_plan(&mut bytes, id, plan);
     let start_ns = 70_000_000_000;
     let mut before = None;
     for cycle in 0..(share * plan.duration() * 200.0) as u64 {
         let time = cycle * 5_000_000;
-        let k = plan.knots.partition_point(|k| k.time_ns <= time).clamp(1, plan.knots.len() - 1);
-        let from = plan.knots[k - 1].time_ns;
-        let along = (time - from) as f64 / (plan.knots[k].time_ns - from) as f64;
+        let (q, knot) = planned(plan, time);
         let mut record = CycleRecord::zeroed();
         record.now_ns = start_ns + time;
         record.target.sequence = cycle + 1;
-        record.target.q = plan.curve(k).at(along);
+        record.target.q = q;
         record.target.plan = id;
-        record.target.knot = (k - 1) as u32;
+        record.target.knot = knot;
         if let Some(q) = before {
             record.has_measured = 1;
             record.measured = MeasuredRecord {

@@ -1,5 +1,7 @@
 //! `planner view`: what its pages hold.
 
+mod common;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -9,9 +11,11 @@ use bytemuck::Zeroable as _;
 use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, UnitVector3, Vector3};
 use nullsweep_ipc_types::PlanId;
 use nullsweep_planner::plan::{Continues, Plan, PlanKnot, Profile};
-use nullsweep_recording::{self as recording, CycleRecord, MAGIC, MeasuredRecord, PlanRecord, Tag};
+use nullsweep_recording::{self as recording, CycleRecord, MAGIC, MeasuredRecord, Tag};
 use nullsweep_robot::{Arm, ArmSpec, JointVector, Robot, Side, Tool};
 use serde_json::Value;
+
+use common::{planned, put_plan};
 
 fn planner(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_planner")).args(args).output().unwrap()
@@ -217,30 +221,21 @@ fn a_scan_shows_its_planes_and_objects() {
 fn flight(folder: &Path, plan: &Plan, arm: &Arm) -> PathBuf {
     let id = PlanId { epoch: 5, number: 1 };
     let mut bytes = MAGIC.to_vec();
-    let head = PlanRecord { id, ..PlanRecord::zeroed() };
-    let knots: Vec<recording::PlanKnot> = plan
-        .knots
-        .iter()
-        .map(|k| recording::PlanKnot { time: k.time_ns as f64, q: k.q, v: k.v, ramp: 1.0 })
-        .collect();
-    let parts: [&[u8]; 2] = [bytemuck::bytes_of(&head), bytemuck::cast_slice(&knots)];
-    recording::put(&mut bytes, Tag::Plan, &parts);
+    put_plan(&mut bytes, id, plan);
     let mut before = None;
     for cycle in 1..=1271u64 {
         let time = cycle.saturating_sub(100) * 10_000_000;
-        let k = plan.knots.partition_point(|k| k.time_ns <= time).clamp(1, plan.knots.len() - 1);
-        let from = plan.knots[k - 1].time_ns;
-        let share = (time - from) as f64 / (plan.knots[k].time_ns - from) as f64;
+        let (q, knot) = planned(plan, time);
         let mut record = CycleRecord::zeroed();
         record.now_ns = 70_000_000_000 + cycle * 10_000_000;
         record.target.sequence = cycle;
-        record.target.q = plan.curve(k).at(share.min(1.0));
+        record.target.q = q;
         // An executor goes through a plan by the turns that are nearest to where the arm was.
         assert!(arm.continuous().is(6));
         record.target.q[6] += std::f64::consts::TAU;
         if cycle >= 100 {
             record.target.plan = id;
-            record.target.knot = (k - 1) as u32;
+            record.target.knot = knot;
         }
         if let Some(answers) = before {
             let mut q: JointVector = answers;
@@ -307,6 +302,53 @@ fn a_recording_is_shown_beside_its_plan_with_its_largest_deviation() {
     let messages = mcap::MessageStream::new(&bytes).unwrap();
     let seen = messages.filter(|m| m.as_ref().unwrap().channel.topic == "/measured/joint_states");
     assert!(seen.count() > 500);
+}
+
+/// One plan was stopped in its sixth second; what it had left ran nine seconds later.
+#[test]
+fn a_recording_says_when_each_plan_ran() {
+    let folder = tempfile::tempdir().unwrap();
+    let (first, arm) = plan(Side::Right, Profile::Acceleration);
+    let mut second = first.clone();
+    second.knots = first.knots[20..].to_vec();
+    let from = second.knots[0].time_ns;
+    second.knots.iter_mut().for_each(|knot| knot.time_ns -= from);
+    second.past = first.followed(20);
+    let ids = [1, 2].map(|number| PlanId { epoch: 5, number });
+    let mut bytes = MAGIC.to_vec();
+    put_plan(&mut bytes, ids[0], &first);
+    put_plan(&mut bytes, ids[1], &second);
+    for cycle in 1..=1800u64 {
+        let mut record = CycleRecord::zeroed();
+        record.now_ns = 70_000_000_000 + cycle * 10_000_000;
+        record.target.sequence = cycle;
+        let ((q, knot), id) = match cycle {
+            1..=600 => (planned(&first, cycle * 10_000_000), ids[0]),
+            601..=1499 => ((first.knots[20].q, 0), PlanId::NONE),
+            _ => (planned(&second, (cycle - 1500) * 10_000_000), ids[1]),
+        };
+        (record.target.q, record.target.knot, record.target.plan) = (q, knot, id);
+        record.has_measured = 1;
+        record.measured = MeasuredRecord {
+            stamp_ns: record.now_ns - 1000,
+            setpoint_sequence: cycle - 1,
+            q,
+            joint_count: arm.dof() as u32,
+            status: 1,
+        };
+        recording::put(&mut bytes, Tag::Cycle, &[bytemuck::bytes_of(&record)]);
+    }
+    let recording = folder.path().join("flight-0.nswrec");
+    std::fs::write(&recording, bytes).unwrap();
+    let files = [("a.json", &first), ("b.json", &second)]
+        .map(|(name, plan)| write(folder.path(), name, plan));
+    let [a, b] = [0, 1].map(|i| files[i].to_str().unwrap());
+    let (_, data) = page(folder.path(), "seen.html", &[a, b, recording.to_str().unwrap()]);
+    let start = data["plans"][1]["starts_at"].as_f64().unwrap();
+    assert!((start - 15.0).abs() < 0.02, "{start}");
+    assert_eq!(data["measured"][0]["starts_at"], 0.0);
+    let end = floats(&data["plans"][0]["times"]).into_iter().next_back().unwrap();
+    assert!((end - 6.0).abs() < 1e-6, "{end}: it was left in its knot 20");
 }
 
 #[test]

@@ -97,6 +97,18 @@ fn a_cell_keeps_the_root_path_that_it_was_made_for() {
     assert!(cell.contains(&format!("\nipc_root = {root:?}\n")), "{cell}");
 }
 
+/// What is placed is kept clear of also where nothing was scanned: its file is read.
+#[test]
+fn a_way_through_nothing_scanned_heeds_what_is_placed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (code, _, said) = run(
+        folder.path(),
+        "goto home --empty --obstacles missing.toml --ipc-root world --timeout 1",
+    );
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("missing.toml"), "{said}");
+}
+
 #[test]
 fn a_file_to_be_viewed_that_is_not_there_is_named() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -103,19 +103,14 @@ impl Mover {
         Ok(still.then_some(Stands { pose: status.pose, measured: true }))
     }
 
-    /// Has the base stand where a stop has it, its joints set, and waits for that. `progress` is told how
-    /// far it is.
+    /// Has the base stand where a stop has it, its joints set, and waits for that.
     ///
     /// # Errors
     /// See [`BaseError`].
-    pub fn drive(
-        &self,
-        stop: &ProgramStop,
-        progress: &mut dyn FnMut(&BaseStatus),
-    ) -> Result<Stands, BaseError> {
+    pub fn drive(&self, stop: &ProgramStop) -> Result<Stands, BaseError> {
         let goal = order(stop)?;
         match self {
-            Self::Driver(client) => driven(client, &goal, progress),
+            Self::Driver(client) => driven(client, &goal),
             Self::Person(server) => confirmed(server, &goal),
         }
     }
@@ -140,11 +135,7 @@ fn order(stop: &ProgramStop) -> Result<BaseCommand, BaseError> {
 }
 
 /// Sends the driver there and waits.
-fn driven(
-    client: &BaseClient,
-    goal: &BaseCommand,
-    progress: &mut dyn FnMut(&BaseStatus),
-) -> Result<Stands, BaseError> {
+fn driven(client: &BaseClient, goal: &BaseCommand) -> Result<Stands, BaseError> {
     let to = goal.pose;
     let mut status = client.call(*goal, ANSWER)?;
     let verdict = Verdict::from_wire(status.verdict).unwrap_or(Verdict::Unknown);
@@ -155,7 +146,6 @@ fn driven(
         if status.goal != goal.goal {
             return Err(BaseError::Elsewhere { to });
         }
-        progress(&status);
         match BaseState::from_wire(status.state) {
             Some(BaseState::Arrived) => {
                 return Ok(Stands { pose: status.pose, measured: status.measured != 0 });
@@ -261,7 +251,7 @@ mod tests {
             let start = Instant::now();
             loop {
                 match Mover::find(&ipc) {
-                    Ok(mover @ Mover::Driver(_)) => return mover.drive(&stop(), &mut |_| ()),
+                    Ok(mover @ Mover::Driver(_)) => return mover.drive(&stop()),
                     _ => assert!(start.elapsed() < Duration::from_secs(20), "no driver came"),
                 }
             }
@@ -322,7 +312,7 @@ mod tests {
                 assert_eq!(say(BaseOrder::Status).state, BaseState::Driving.wire());
                 assert_eq!(say(BaseOrder::Arrived).verdict, Verdict::Accepted.wire());
             });
-            let stands = mover.drive(&stop(), &mut |_| ()).expect("it is said");
+            let stands = mover.drive(&stop()).expect("it is said");
             assert_eq!(stands, Stands { pose: [1.0, 2.0, 0.5], measured: false });
         });
     }

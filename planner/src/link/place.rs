@@ -79,7 +79,7 @@ pub(super) fn runs(plan: &Plan, at: &JointArray, knot: usize) -> Result<(), Off>
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use nullsweep_ipc_types::MAX_JOINTS;
     use nullsweep_robot::{JointVector, Tool};
 
@@ -87,7 +87,7 @@ mod tests {
     use crate::plan::{CostKind, FORMAT, Method, PlanKnot, Profile};
 
     /// One joint that turns by 0.1 rad a second.
-    fn plan() -> Plan {
+    pub(in crate::link) fn plan() -> Plan {
         let knot = |k: u64| {
             let mut q = [0.0; MAX_DOF];
             q[0] = 0.1 * k as f64;

@@ -284,48 +284,8 @@ fn look(
 
 #[cfg(test)]
 mod tests {
-    use nullsweep_robot::Tool;
-
     use super::*;
-    use crate::plan::{CostKind, FORMAT, Method, PlanKnot, Profile};
-
-    /// One joint that turns by 0.1 rad a second.
-    fn plan() -> Plan {
-        let knot = |k: u64| {
-            let mut q = [0.0; MAX_DOF];
-            q[0] = 0.1 * k as f64;
-            PlanKnot {
-                time_ns: k * 1_000_000_000,
-                q: JointVector::new(q),
-                v: JointVector::ZERO,
-                line: None,
-                patch: None,
-            }
-        };
-        Plan {
-            format: FORMAT,
-            robot: "one".into(),
-            fingerprint: 1,
-            joints: vec!["roll".into()],
-            held: Vec::new(),
-            tool: Tool::default(),
-            base: [0.0; 3],
-            base_height: 0.0,
-            method: Method::Tsp,
-            cost: CostKind::Time,
-            profile: Profile::Velocity,
-            jerk: None,
-            seed: 1,
-            knots: (0..10).map(knot).collect(),
-            patches: Vec::new(),
-            surface: Vec::new(),
-            regions: Vec::new(),
-            continues: None,
-            past: Vec::new(),
-            left: Vec::new(),
-            seal: None,
-        }
-    }
+    use crate::link::place::tests::plan;
 
     #[test]
     fn the_knot_lies_beyond_the_lead() {

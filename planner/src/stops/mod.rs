@@ -1,8 +1,8 @@
 //! The whole object: where the robot stops so that both arms together sweep all that any stop could.
 //!
 //! A [`Survey`] says what each of many places on the floor reaches, by an exact look. A few of them are
-//! chosen by a weighted set cover ([`cover`](crate::cover)), what they reach is shared out among them and their arms
-//! ([`Share`]), each share is planned by itself ([`work`]), and what no plan has swept is chosen for
+//! chosen by a weighted set cover ([`cover`](crate::cover)), what they reach is shared out among them and
+//! their arms ([`Share`]), each share is planned by itself ([`work`]), and what no plan has swept is chosen for
 //! again, until no stop is worth it ([`Rounds`]).
 
 mod choice;

@@ -7,8 +7,7 @@ use super::error::StopsError;
 use super::share::Notes;
 use crate::pipeline::{self, After, End, Job, Outcome, PipelineError, StanceChoice};
 use crate::plan::{Plan, Profile, Program, Stretch, Work};
-use crate::sweep::coverage;
-use crate::sweep::{DIP, Pace};
+use crate::sweep::{DIP, Pace, coverage};
 use crate::workcell::{Scene, Stance};
 
 /// Where a plan of a program was left.

@@ -56,16 +56,23 @@ impl Segment {
                 let mut member = vec![false; view.points.len()];
                 members.iter().for_each(|&i| member[i as usize] = true);
                 let kept: Vec<usize> = (0..member.len()).filter(|&i| member[i] == keep).collect();
-                let all = Grid::new(&view.points, NEXT_TO);
-                let nearest = |p: &Point3<f64>| all.nearest(p, BESIDE, |_| true);
-                let ours =
-                    |p: &Point3<f64>| nearest(p).is_some_and(|(i, _)| member[i as usize]) == keep;
+                let ours = |places: &[Point3<f64>]| -> Vec<Point3<f64>> {
+                    if places.is_empty() {
+                        return Vec::new();
+                    }
+                    let all = Grid::new(&view.points, NEXT_TO);
+                    let is_ours = |p: &&Point3<f64>| {
+                        let nearest = all.nearest(p, BESIDE, |_| true);
+                        nearest.is_some_and(|(i, _)| member[i as usize]) == keep
+                    };
+                    places.iter().filter(is_ours).copied().collect()
+                };
                 View {
                     points: kept.iter().map(|&i| view.points[i]).collect(),
                     normals: view.normals.as_ref().map(|n| kept.iter().map(|&i| n[i]).collect()),
                     colours: view.colours.as_ref().map(|c| kept.iter().map(|&i| c[i]).collect()),
-                    faces: view.faces.iter().copied().filter(ours).collect(),
-                    inside: view.inside.iter().copied().filter(ours).collect(),
+                    faces: ours(&view.faces),
+                    inside: ours(&view.inside),
                     sensor: view.sensor,
                 }
             };
