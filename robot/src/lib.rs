@@ -42,7 +42,7 @@ pub use joints::{Continuous, JointVector, MAX_DOF, wrap};
 pub use limits::JointLimits;
 pub use pr2::Side;
 pub use spec::{ArmSpec, HeldJoint};
-pub use tool::{Mounted, Tool, ToolError};
+pub use tool::{Camera, Footprint, Mounted, Nozzle, Roller, Tool, ToolBody, ToolError};
 pub use urdf::{
     CollisionShape, Geometry, HardLimits, Joint, JointKind, Link, Mimic, Robot, SafetyController,
     UrdfError,

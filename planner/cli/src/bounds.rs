@@ -89,13 +89,12 @@ impl BoundsArgs {
                 self.method.iter().flat_map(|m| self.cost.iter().map(move |c| (m, c)))
             {
                 let job = Job {
-                    tool: tool.clone(),
                     method: method.method(),
                     cost: cost.into(),
                     ik_samples: self.ik_samples as usize,
                     seed,
                     collision: self.robot.collision(),
-                    ..Job::new(self.robot.spec())
+                    ..Job::new(self.robot.spec()).with_tool(tool.clone())
                 };
                 rows.push(bounded(&robot, &scene, (&name, &job), &ascent, bars)?);
             }

@@ -177,7 +177,9 @@ impl CheckArgs {
         line("arm", format!("{} joints from {} to {}", arm.dof(), spec.base, spec.tip));
         line("joints", arm.joint_names().join(", "));
         let tool = self.tool()?;
-        line("tool", format!("{}, {:.3} × {:.3} m", tool.name, tool.length, tool.width));
+        let [across, along] = tool.track();
+        let shape = tool.footprint.shape();
+        line("tool", format!("{}, {shape}, {across:.3} × {along:.3} m", tool.name));
         let pad = tool.on(arm);
         let first = arm.moving_links().first().map_or(0, |link| *link);
         let mut poses = vec![nalgebra::Isometry3::identity(); robot.links().len()];

@@ -7,8 +7,8 @@ use anyhow::Context;
 use clap::Args;
 use nullsweep_collision::Options;
 use nullsweep_planner::link::Site;
-use nullsweep_planner::pipeline::{self, After, End, Job, Outcome, StanceChoice};
-use nullsweep_planner::plan::Plan;
+use nullsweep_planner::pipeline::{self, After, End, Job, Outcome, StanceChoice, sizes};
+use nullsweep_planner::plan::{Method, Plan};
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
@@ -78,9 +78,9 @@ pub(super) struct PlanArgs {
     #[arg(long, requires = "after")]
     again: bool,
 
-    /// How the order is found.
-    #[arg(long, value_enum, default_value = "curvature")]
-    method: MethodArg,
+    /// How the order is found; without it by Curvature, for a roller and a nozzle in strips (raster).
+    #[arg(long, value_enum)]
+    method: Option<MethodArg>,
     /// What is minimised.
     #[arg(long, value_enum, default_value = "time")]
     cost: CostArg,
@@ -100,22 +100,22 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "NAME|FILE")]
     jerk: Option<JerkArg>,
     /// Speed of the pad's centre on the surface, wherever the joints allow it; not at bang-bang
-    /// velocity. [m/s]
+    /// velocity. Without it as fast as they allow, or as a nozzle's deposit asks. [m/s]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     tool_speed: Option<f64>,
     /// Whether the pad's way on the surface is made a fair curve, as far as it sweeps as much: `on`,
     /// `off`, or `auto`: with limited accelerations or jerks.
     #[arg(long, value_enum, default_value = "auto")]
     smooth: SmoothArg,
-    /// Radius of a patch's neighbourhood. [m]
-    #[arg(long, default_value_t = PatchConfig::default().epsilon, value_parser = positive)]
-    patch_radius: f64,
+    /// Radius of a patch's neighbourhood; without it from the tool's size (0.04 for the sponge). [m]
+    #[arg(long, value_name = "M", value_parser = positive)]
+    patch_radius: Option<f64>,
     /// Nearest neighbours of each patch that are tried as edges.
     #[arg(long, default_value_t = GraphConfig::default().neighbours)]
     neighbours: usize,
-    /// Longest edge. [m]
-    #[arg(long, default_value_t = GraphConfig::default().radius, value_parser = positive)]
-    radius: f64,
+    /// Longest edge; without it from the tool's size (0.1 for the sponge). [m]
+    #[arg(long, value_name = "M", value_parser = positive)]
+    radius: Option<f64>,
     /// Weight of turning against distance in the Curvature-GTSP (Eq. 4).
     #[arg(long, default_value_t = FormulationConfig::default().beta, value_parser = not_negative)]
     beta: f64,
@@ -245,7 +245,7 @@ impl PlanArgs {
         job: Job,
         bars: &Bars,
     ) -> anyhow::Result<Made> {
-        if job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
+        if job.tool.touches() && job.tool.stand_off <= 0.0 && job.tool.hover() > HOVERS {
             let hover = 1e3 * job.tool.hover();
             bars.note(&format!(
                 "points up to {hover:.0} mm before the pad count as swept: its stand_off and \
@@ -404,7 +404,6 @@ fn job(
     };
     Ok(Job {
         arm: args.robot.spec(),
-        tool,
         stance,
         start: args.start.as_ref().map(|start| posture(start, "--start")).transpose()?,
         end: match &args.end {
@@ -415,19 +414,22 @@ fn job(
         },
         after,
         spared: Vec::new(),
-        method: args.method.method(),
+        method: method(args, &tool),
         cost: args.cost.into(),
         ik_samples: args.ik_samples as usize,
         v_max: args.v_max,
         profile: args.profile.into(),
         jerk: args.jerk.as_ref().map(|jerk| jerk.of(&arm)).transpose()?,
-        tool_speed: args.tool_speed,
+        tool_speed: args.tool_speed.or(tool.own_speed()),
         smooth: args.smooth.with(args.profile.into()),
-        patches: PatchConfig { epsilon: args.patch_radius, ..PatchConfig::default() },
+        patches: match args.patch_radius {
+            Some(epsilon) => PatchConfig { epsilon, ..sizes::patches(&tool) },
+            None => sizes::patches(&tool),
+        },
         graph: GraphConfig {
             neighbours: args.neighbours,
-            radius: args.radius,
-            ..GraphConfig::default()
+            radius: args.radius.unwrap_or(sizes::graph(&tool).radius),
+            ..sizes::graph(&tool)
         },
         formulation: FormulationConfig {
             beta: args.beta,
@@ -437,7 +439,15 @@ fn job(
         refinements: args.refinements,
         collision: args.robot.collision(),
         seed: args.seed,
+        tool,
     })
+}
+
+/// The method that is asked for, or that suits the tool.
+fn method(args: &PlanArgs, tool: &Tool) -> Option<Method> {
+    let in_strips = tool.rolls() || tool.own_speed().is_some();
+    let own = if in_strips { Method::Raster } else { Method::Curvature };
+    args.method.map_or(Some(own), MethodArg::method)
 }
 
 fn held(args: &PlanArgs) -> Vec<(String, f64)> {

@@ -89,6 +89,8 @@ impl World {
         let margin = match touch {
             Some(Touch::Pad(pad)) => return self.is_pad_clear(shape, pad, pose, slack),
             Some(Touch::Rigid(margin)) => *margin,
+            Some(Touch::Afar) if !self.is_kept_out(shape, pose, slack) => return false,
+            Some(Touch::Afar) => self.margins.environment,
             None => self.margins.environment,
         };
         is_clear_of(&self.field, shape, pose, margin + slack)
@@ -97,8 +99,7 @@ impl World {
     /// Whether the pad in contact is clear of the points that press on it: none is where its
     /// keep-out boxes are; and of those that it may not touch.
     fn is_pad_clear(&self, shape: &Moving, pad: &Pad, pose: &Frame, slack: f64) -> bool {
-        let (keep_out, margin) = &self.keep_out;
-        if !is_clear_of(keep_out, shape, pose, margin + slack) {
+        if !self.is_kept_out(shape, pose, slack) {
             return false;
         }
         let far = |s: &Sphere| self.firm.is_farther(&pose.apply(&s.centre), s.radius + slack);
@@ -108,6 +109,12 @@ impl World {
                 .guards
                 .iter()
                 .all(|(place, solid)| self.firm.all_near(solid, &pose.then(place), slack, holds))
+    }
+
+    /// Whether the tool in use keeps away from the points that it is to keep out of.
+    fn is_kept_out(&self, shape: &Moving, pose: &Frame, slack: f64) -> bool {
+        let (keep_out, margin) = &self.keep_out;
+        is_clear_of(keep_out, shape, pose, margin + slack)
     }
 
     /// Whether one check holds with the slack added, the bodies standing at `poses`.

@@ -215,14 +215,16 @@ impl Exact {
         let scene = &self.scene;
         let (tool, margins) = (&scene.tool, &scene.margins);
         let to_contact = (self.arm.tip_pose(q) * tool.contact_in_tip()).inverse();
+        let [half_x, half_y] = tool.half_sides();
         let in_prism = move |p: &Point3<f64>| {
             let p = to_contact * p;
-            p.x.abs() <= 0.5 * tool.width + margins.contact_growth
-                && p.y.abs() <= 0.5 * tool.length + margins.contact_growth
+            p.x.abs() <= half_x + margins.contact_growth
+                && p.y.abs() <= half_y + margins.contact_growth
                 && (-tool.press_max..=margins.contact_front).contains(&p.z)
         };
         parts.iter().filter_map(move |&i| {
-            let may_touch = contact == ToolContact::Allowed && scene.at_tip[i];
+            let is_in_use = contact == ToolContact::Allowed && tool.touches();
+            let may_touch = is_in_use && scene.at_tip[i];
             let is_pressed = may_touch && scene.parts[i].is_pad;
             let margin = match (may_touch, is_pressed) {
                 (true, true) => margins.environment.min(margins.contact_growth),

@@ -34,6 +34,9 @@
 //!   it works before its plane where that is more, in the prism too.
 //! - Every other shape keeps its full margin.
 //!
+//! A tool that works from afar (a nozzle, a camera) touches nothing: the rule gives it no leave, and
+//! with [`ToolContact::Allowed`] it keeps from points to keep out of as far as it works.
+//!
 //! Obstacles are never contact.
 
 mod bodies;
@@ -59,6 +62,7 @@ mod rules;
 mod scene;
 mod shapes;
 mod sieve;
+mod sight;
 mod solid;
 mod spheres;
 mod srdf;
@@ -77,5 +81,6 @@ pub use options::{Attached, Options};
 pub use pairs::{Excluded, Reason};
 pub use points::Points;
 pub use rules::{Hit, Margins, ToolContact, With};
+pub use sight::Solids;
 pub use srdf::{GroupState, SrdfError, group_states};
 pub use world::World;

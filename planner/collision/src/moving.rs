@@ -32,6 +32,8 @@ pub(crate) enum Touch {
     Rigid(f64),
     /// The pad: anything in its prism.
     Pad(Pad),
+    /// A tool that works from afar: nothing, and least of all what it keeps out of.
+    Afar,
 }
 
 /// Where the pad keeps its margin while it may touch.
@@ -54,6 +56,8 @@ pub(crate) struct Contact {
     /// Bounds in the contact frame. \[m\]
     pub(crate) min: Vector3<f64>,
     pub(crate) max: Vector3<f64>,
+    /// Whether the tool works by touching.
+    touches: bool,
 }
 
 impl Moving {
@@ -95,22 +99,31 @@ impl Moving {
 impl Contact {
     pub(crate) fn new(bodies: &Bodies, tool: &Tool, margins: &Margins) -> Self {
         let contact_in_tip = Frame::from(&tool.contact_in_tip());
-        let half = 0.5 * Vector3::new(tool.width, tool.length, 0.0);
+        let [x, y] = tool.half_sides();
+        let half = Vector3::new(x, y, 0.0);
         let growth = Vector3::new(margins.contact_growth, margins.contact_growth, 0.0);
         Self {
             frame: bodies.tip.then(&contact_in_tip),
             min: -half - growth - Vector3::new(0.0, 0.0, tool.press_max),
             max: half + growth + Vector3::new(0.0, 0.0, margins.contact_front),
+            touches: tool.touches(),
         }
     }
 }
 
 impl Touch {
-    pub(crate) fn new(part: &Part, place: &Frame, contact: &Contact, margins: &Margins) -> Self {
-        if part.is_pad {
-            Self::Pad(Pad::new(part, place, contact, margins))
-        } else {
-            Self::Rigid(margins.environment.min(margins.contact_clearance))
+    /// `None` for a part that keeps its full margin whatever the tool does.
+    pub(crate) fn new(
+        part: &Part,
+        place: &Frame,
+        contact: &Contact,
+        margins: &Margins,
+    ) -> Option<Self> {
+        match (contact.touches, part.is_pad) {
+            (true, true) => Some(Self::Pad(Pad::new(part, place, contact, margins))),
+            (true, false) => Some(Self::Rigid(margins.environment.min(margins.contact_clearance))),
+            (false, true) => Some(Self::Afar),
+            (false, false) => None,
         }
     }
 }

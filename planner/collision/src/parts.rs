@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use nullsweep_robot::{Arm, Robot, Tool};
+use nullsweep_robot::{Arm, Robot, Tool, ToolBody};
 use parry3d_f64::shape::SharedShape;
 
 use crate::error::CollisionError;
@@ -119,12 +119,26 @@ pub(crate) fn collect(
         parts.extend(solids.into_iter().map(|solid| Part::new(Some(index), name, solid, pose)));
         places.extend(told);
     }
-    let half = 0.5 * Vector3::new(tool.width, tool.length, tool.thickness);
-    let centre = tool.contact_in_tip() * Isometry3::translation(0.0, 0.0, -half.z);
-    let pad = Part::new(None, &tool.name, Solid::Box { half }, centre);
-    parts.push(Part { is_pad: true, ..pad });
+    parts.push(pad(tool));
     notes.extend(places);
     Ok(Parts { parts, guessed, notes })
+}
+
+/// The tool's body.
+fn pad(tool: &Tool) -> Part {
+    let (solid, back, turn) = match tool.body() {
+        ToolBody::Box { half } => (Solid::Box { half: half.into() }, half[2], None),
+        ToolBody::Disc { radius, half } => {
+            (Solid::Cylinder { half, radius }, half, Some(Vector3::x_axis()))
+        }
+        ToolBody::Roller { radius, half } => (Solid::Cylinder { half, radius }, radius, None),
+    };
+    let place = tool.contact_in_tip() * Isometry3::translation(0.0, 0.0, -back);
+    // A cylinder's own axis is y.
+    let origin = turn.map_or(place, |axis| {
+        place * UnitQuaternion::from_axis_angle(&axis, std::f64::consts::FRAC_PI_2)
+    });
+    Part { is_pad: true, ..Part::new(None, &tool.name, solid, origin) }
 }
 
 /// Capsules from a link's origin to the joints of its children; a ball at the origin where

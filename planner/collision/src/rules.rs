@@ -39,7 +39,7 @@ impl Margins {
     /// What the pad keeps from a point that not even it may touch: its margin to everything else, and
     /// as far as it works before its plane. \[m\]
     pub(crate) fn of_keep_out(&self, tool: &Tool) -> f64 {
-        self.environment.max(tool.hover())
+        self.environment.max(tool.farthest())
     }
 }
 

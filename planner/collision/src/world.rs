@@ -149,8 +149,8 @@ fn sort(scene: &Scene, bodies: &Bodies, contact: &Contact) -> Sorted {
         match body {
             Some(body) => {
                 slots.push((Some(body), moving.len()));
-                let touch =
-                    (body == bodies.tip_body).then(|| Touch::new(part, &place, contact, margins));
+                let at_tip = body == bodies.tip_body;
+                let touch = at_tip.then(|| Touch::new(part, &place, contact, margins)).flatten();
                 moving.push(Moving::new(part, body, place, touch));
             }
             None => {

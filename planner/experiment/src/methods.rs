@@ -116,7 +116,7 @@ pub fn by_cost<C: Cost>(
                 .map(|patch| match setting.reached[patch] {
                     None => Cluster::new(Vec::new()),
                     Some(_) => {
-                        let stops = formulation::incident_stops(graph, patch);
+                        let stops = formulation::incident_stops(graph, patch, &setting.tool);
                         cluster(setting, &stops, task.samples)
                     }
                 })

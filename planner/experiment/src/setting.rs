@@ -120,10 +120,9 @@ impl Setting {
     /// tool may stand the other way round.
     pub fn samples(&self, stop: &Stop, count: usize, out: &mut Vec<Sample>) {
         let range = self.arm.ik().redundancy_range();
-        let turns: &[f64] = if self.tool.symmetric { &[0.0, std::f64::consts::PI] } else { &[0.0] };
-        let at = |value: f64, out: &mut Vec<Sample>| {
+                let at = |value: f64, out: &mut Vec<Sample>| {
             let before = out.len();
-            for turn in turns {
+            for turn in self.tool.turns() {
                 let turned = Stop { heading: stop.heading + turn, ..*stop };
                 let contact = formulation::pose(&self.patches, &self.tool, &turned);
                 solve(&self.arm, &self.tool, &contact, stop.heading, value, out);

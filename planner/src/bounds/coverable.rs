@@ -72,7 +72,7 @@ fn poses(cell: Workcell<'_>, bed: &Bed, foot: &SurfacePoint) -> Vec<(Isometry3<f
     let laid = std::iter::once(normal)
         .chain(tilted)
         .filter_map(|normal| bed.laid(Patch { centre, normal, points: Vec::new(), rmse: 0.0 }));
-    let turn = if cell.tool.symmetric { 0.5 } else { 1.0 } * TAU;
+    let turn = cell.tool.heading_range();
     laid.flat_map(|place| {
         (0..HEADINGS).map(move |h| {
             let heading = turn * h as f64 / HEADINGS as f64;

@@ -1,7 +1,6 @@
 //! The joint vectors from which a plan chooses: at each of its stops all that the planner samples.
 
 use std::collections::HashMap;
-use std::f64::consts::{PI, TAU};
 
 use nullsweep_robot::JointVector;
 use rayon::prelude::*;
@@ -37,7 +36,7 @@ impl Stops {
         let values = redundancies(cell.arm.ik().redundancy_range(), job.ik_samples);
         let mut place: HashMap<usize, usize> = HashMap::new();
         let (mut firsts, mut headings) = (Vec::new(), Vec::<Vec<f64>>::new());
-        let turn = if job.tool.symmetric { PI } else { TAU };
+        let turn = job.tool.heading_range();
         for visit in &outcome.visits {
             let next = firsts.len();
             let at = *place.entry(visit.patch).or_insert(next);
@@ -59,7 +58,7 @@ impl Stops {
             .zip(headings)
             .map(|(visit, headings)| {
                 let mut samples = Vec::new();
-                let turns: &[f64] = if job.tool.symmetric { &[0.0, PI] } else { &[0.0] };
+                let turns = job.tool.turns();
                 for (heading, turn) in
                     headings.iter().flat_map(|h| turns.iter().map(move |t| (h, t)))
                 {

@@ -13,14 +13,13 @@ mod follow;
 mod piece;
 mod window;
 
-use nullsweep_surface::Scan;
 use rayon::prelude::*;
 
 use self::follow::{Station, follow};
 use self::piece::Piece;
 use self::window::Windows;
 use crate::plan::{Plan, PlanKnot};
-use crate::sweep::{contact_motion, coverage};
+use crate::sweep::{Sight, coverage};
 use crate::workcell::{Bed, Workcell};
 
 /// Share of the points to sweep that a fair way may leave out of what the way as it was sweeps.
@@ -35,9 +34,11 @@ const ROUNDS: usize = 40;
 #[derive(Clone, Copy)]
 pub struct Keep<'a> {
     /// The scanned points, in the root frame.
-    pub scan: &'a Scan,
+    pub sight: Sight<'a>,
     /// Which of them count.
     pub points: &'a [bool],
+    /// What the tool goes at: a nozzle lays on by it. \[m/s\]
+    pub speed: f64,
 }
 
 /// The plan (which must be of bang-bang velocity) with fair contact pieces, proven free of
@@ -46,7 +47,7 @@ pub struct Keep<'a> {
 pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan {
     let mut pieces: Vec<Fair> = Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect();
     let swept = |plan: &Plan| {
-        coverage::swept(keep.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool)
+        coverage::done_by(keep.sight, plan.trajectory(), cell.arm, keep.speed)
     };
     // Of the points to sweep, and of all.
     let count = |swept: &[bool]| {
@@ -65,8 +66,8 @@ pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan 
             return made;
         }
         let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);
-        let lost: Vec<_> = lost.map(|i| keep.scan.points[i]).collect();
-        let reach = 0.5 * cell.tool.width.hypot(cell.tool.length);
+        let lost: Vec<_> = lost.map(|i| keep.sight.scan.points[i]).collect();
+        let reach = cell.tool.outer_radius();
         let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, reach, narrowest));
         if given.filter(|given| *given).count() == 0 {
             if narrowest == 0.0 {

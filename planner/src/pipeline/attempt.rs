@@ -12,7 +12,7 @@ use crate::motion::{Leg, Memo, Mover, layered};
 use crate::plan::{Continues, CostKind, Method, Plan};
 use crate::progress::{Progress, left_out};
 use crate::roadmap::{Graph, Nodes, graph};
-use crate::sweep::{contact_motion, coverage};
+use crate::sweep::{Sight, coverage};
 use crate::tour::formulation::{self, Stop};
 use crate::workcell::stance::Stance;
 use crate::workcell::{Bed, Sample, Workcell, reach, redundancies};
@@ -24,6 +24,8 @@ pub(super) struct Planning<'a> {
     pub(super) stance: &'a Stance,
     pub(super) cell: Workcell<'a>,
     pub(super) scan: &'a Scan,
+    /// The scan, and what may hide it.
+    pub(super) sight: Sight<'a>,
     pub(super) bed: &'a Bed,
     pub(super) start: JointVector,
     /// Of each joint. \[rad/s\] or \[m/s\]
@@ -150,8 +152,8 @@ impl Planning<'_> {
 
     /// The points to sweep that the plan leaves out.
     pub(super) fn left(&self, plan: &Plan) -> Vec<bool> {
-        let poses = contact_motion(plan.trajectory(), self.cell.arm);
-        let swept = coverage::swept(self.scan, &poses, &self.job.tool);
+        let (motion, speed) = (plan.trajectory(), self.job.working_speed());
+        let swept = coverage::done_by(self.sight, motion, self.cell.arm, speed);
         (0..swept.len()).map(|i| self.to_sweep[i] && !swept[i] && !self.already[i]).collect()
     }
 
@@ -165,7 +167,7 @@ impl Planning<'_> {
     }
 
     pub(super) fn fill_in_radius(&self) -> f64 {
-        self.job.patches.epsilon.min(0.5 * self.job.tool.width)
+        self.job.patches.epsilon.min(self.job.tool.inner_radius())
     }
 
     /// The patches with others over what the attempt leaves out; `None` where nothing can be
@@ -247,12 +249,11 @@ impl TourContext<'_> {
         }
     }
 
-    /// All samples at a stop; for a symmetric pad also those of the opposite heading.
+    /// All samples at a stop, also at the headings that are as good.
     fn layer_at(&self, stop: &Stop, values: &[f64]) -> Vec<Sample> {
         let cell = self.planning.cell;
         let mut layer = Vec::new();
-        let turns: &[f64] = if cell.tool.symmetric { &[0.0, std::f64::consts::PI] } else { &[0.0] };
-        for turn in turns {
+        for turn in cell.tool.turns() {
             let stop = Stop { heading: stop.heading + turn, ..*stop };
             let contact = formulation::pose(self.patches, cell.tool, &stop);
             cell.samples(&contact, stop.heading, values, &mut layer);

@@ -11,7 +11,7 @@ use super::swept::leave_out_swept;
 use crate::fairing::{Keep, fair};
 use crate::plan::{Method, Plan, Profile};
 use crate::progress::Progress;
-use crate::sweep::{contact_motion, coverage};
+use crate::sweep::coverage;
 use crate::timing::{self, Limits, Pace, Rest, paced};
 use crate::workcell::Sample;
 
@@ -136,8 +136,8 @@ impl Choice<'_> {
 
     /// How many points a plan sweeps: of those to sweep, and of all.
     fn swept(&self, plan: &Plan) -> [f64; 2] {
-        let Planning { scan, cell, to_sweep, already, .. } = *self.planning;
-        let swept = coverage::swept(scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool);
+        let Planning { sight, cell, to_sweep, already, .. } = *self.planning;
+        let swept = coverage::swept_by(sight, [plan.trajectory()], cell.arm);
         let swept: Vec<usize> = (0..swept.len()).filter(|&i| swept[i] || already[i]).collect();
         [swept.iter().filter(|&&i| to_sweep[i]).count(), swept.len()].map(|count| count as f64)
     }
@@ -146,9 +146,11 @@ impl Choice<'_> {
 /// The plan as it is gone along: made smooth and timed as the job asks, after what comes to rest first.
 fn moved(of: &Planning<'_>, mut plan: Plan, rest: Option<&Rest>, clock: &mut Clock) -> Plan {
     let Planning { job, cell, progress, .. } = *of;
-    if job.smooth {
+    // A fair way of a pad may turn from its heading, which a roller's must not.
+    if job.smooth && !job.tool.rolls() {
         progress.stage("fairing", None);
-        let keep = Keep { scan: of.scan, points: of.to_sweep };
+        let speed = job.working_speed();
+        let keep = Keep { sight: of.sight, points: of.to_sweep, speed };
         plan = clock.time("fairing", || fair(&plan, cell, of.bed, keep));
         timing::set_times(&mut plan.knots, &of.velocity);
     }

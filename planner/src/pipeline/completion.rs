@@ -140,7 +140,11 @@ impl<'p, C: Cost> Completion<'p, C> {
         let mut choices = STROKES.iter().flat_map(|share| (0..DIRECTIONS).map(move |k| (share, k)));
         choices.any(|(share, k)| {
             let turn = std::f64::consts::TAU * k as f64 / DIRECTIONS as f64;
-            let way = direction(&stop.normal, heading + turn) * (share * job.tool.width);
+            if !job.tool.may_travel(turn) {
+                return false;
+            }
+            let [_, along] = job.tool.track();
+            let way = direction(&stop.normal, heading + turn) * (share * along);
             let Some(foot) = bed.surface().project(&(stop.centre + way), &stop.normal) else {
                 return false;
             };
@@ -174,10 +178,10 @@ impl<'p, C: Cost> Completion<'p, C> {
 
     /// Takes out what the leg sweeps.
     fn sweep(&self, leg: &Leg, left: &mut [bool]) {
-        let Planning { cell, scan, job, .. } = self.planning;
+        let Planning { cell, sight, job, .. } = self.planning;
         let tool = job.tool.on(cell.arm);
         let poses: Vec<_> = leg.joints.iter().map(|q| tool.pose(q)).collect();
-        for (left, swept) in left.iter_mut().zip(coverage::swept(scan, &poses, &job.tool)) {
+        for (left, swept) in left.iter_mut().zip(coverage::swept(*sight, &poses, &job.tool)) {
             *left &= !swept;
         }
     }
@@ -212,7 +216,7 @@ impl<'p, C: Cost> Completion<'p, C> {
     fn places(&self, patch: &Patch, worth: usize, left: &[bool]) -> Vec<Patch> {
         let Planning { bed, scan, job, .. } = *self.planning;
         let turn = |k: usize| std::f64::consts::TAU * k as f64 / ASIDE as f64;
-        let half = 0.5 * job.tool.width;
+        let half = job.tool.inner_radius();
         let aside =
             SHIFTS.iter().flat_map(|share| (0..ASIDE).map(move |k| (share * half, turn(k))));
         let feet = std::iter::once((0.0, 0.0)).chain(aside).filter_map(|(far, to)| {
@@ -319,8 +323,8 @@ impl<C: Cost> Insertion<'_, C> {
     fn reach_from(&self, stop: usize) -> Option<(Sample, Motion<Leg>)> {
         let Planning { job, bed, .. } = self.planning;
         let Visit { patch, sample: from, .. } = &self.visits[stop];
-        let edge =
-            Edge::between(bed, self.patches, *patch, self.patch, &job.graph, job.tool.width)?;
+        let [_, along] = job.tool.track();
+        let edge = Edge::between(bed, self.patches, *patch, self.patch, &job.graph, along)?;
         let heading = edge.heading_b + from.heading - edge.heading_a;
         let mut targets: Vec<Sample> = self.samples(heading);
         targets.retain(|to| to.branch == from.branch);
@@ -344,7 +348,7 @@ impl<C: Cost> Insertion<'_, C> {
             .filter(|&at| self.visits[at].leg.is_jump())
             .chain([self.visits.len()])
             .collect();
-        let turn = if self.planning.job.tool.symmetric { 0.5 } else { 1.0 } * std::f64::consts::TAU;
+        let turn = self.planning.job.tool.heading_range();
         let mut choices: Vec<(f64, usize, Sample)> = (0..HEADINGS)
             .flat_map(|h| self.samples(turn * h as f64 / HEADINGS as f64))
             .flat_map(|sample| places.iter().map(move |&at| (at, sample)))

@@ -56,7 +56,7 @@ pub(super) fn advise(
 }
 
 /// Whether something is in the arm's way.
-fn meets(cause: &Cause) -> bool {
+pub(super) fn meets(cause: &Cause) -> bool {
     matches!(
         cause,
         Cause::Itself { .. } | Cause::Solid { .. } | Cause::Object { .. } | Cause::Unseen { .. }

@@ -26,6 +26,12 @@ pub enum PipelineError {
     /// The finished plan cannot be checked.
     #[error("checking the plan: {0}")]
     Verify(#[from] VerifyError),
+    /// A nozzle at bang-bang velocity.
+    #[error("{tool} lays on by its speed, and at bang-bang velocity the joints alone say how fast it goes")]
+    NoSpeed {
+        /// The tool.
+        tool: String,
+    },
     /// No patch was found.
     #[error("no locally planar patch among {points} points: are they in metres?")]
     NoPatches {

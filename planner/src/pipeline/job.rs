@@ -4,6 +4,7 @@ use nullsweep_collision::Options;
 use nullsweep_robot::{ArmSpec, JointVector, Tool};
 use nullsweep_surface::PatchConfig;
 
+use super::sizes;
 use crate::plan::{Continues, CostKind, Method, Plan, PlanError, Profile};
 use crate::roadmap::GraphConfig;
 use crate::tour::formulation::FormulationConfig;
@@ -90,6 +91,20 @@ impl Job {
             collision: Options::default(),
             seed: 1,
         }
+    }
+
+    /// With a tool, and the sizes and the speed that follow from it.
+    #[must_use]
+    pub fn with_tool(self, tool: Tool) -> Self {
+        let (patches, graph) = (sizes::patches(&tool), sizes::graph(&tool));
+        let tool_speed = tool.own_speed().or(self.tool_speed);
+        Self { tool, patches, graph, tool_speed, ..self }
+    }
+
+    /// The speed at which the tool works as far as the joints allow it, for what is laid on by speed.
+    /// \[m/s\]
+    pub(super) fn working_speed(&self) -> f64 {
+        self.tool_speed.or(self.tool.own_speed()).unwrap_or(1.0)
     }
 }
 

@@ -52,7 +52,7 @@ impl Planning<'_> {
                 .collect();
             for (&patch, cluster) in component.iter().zip(made) {
                 if cluster.samples().is_empty() {
-                    rest.push(formulation::incident_stops(graph, patch)[0]);
+                    rest.push(formulation::incident_stops(graph, patch, &job.tool)[0]);
                 } else {
                     members.push(patch);
                     clusters.push(cluster);
@@ -83,11 +83,9 @@ impl Planning<'_> {
     /// The samples of a patch at the headings in which its edges leave it.
     fn cluster(&self, graph: &Graph, patches: &[Patch], patch: usize, values: &[f64]) -> Cluster {
         let mut samples = Vec::new();
-        for stop in formulation::incident_stops(graph, patch) {
-            let turns: &[f64] =
-                if self.cell.tool.symmetric { &[0.0, std::f64::consts::PI] } else { &[0.0] };
-            // Both turns are of the one stop, whose heading the tour is told.
-            for turn in turns {
+        for stop in formulation::incident_stops(graph, patch, self.cell.tool) {
+            // All turns are of the one stop, whose heading the tour is told.
+            for turn in self.cell.tool.turns() {
                 let turned = Stop { heading: stop.heading + turn, ..stop };
                 let contact = formulation::pose(patches, self.cell.tool, &turned);
                 self.cell.samples(&contact, stop.heading, values, &mut samples);

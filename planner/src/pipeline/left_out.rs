@@ -7,6 +7,7 @@ use nullsweep_surface::{Patch, Scan};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::longer::Longer;
 use super::other::FreeFrom;
 use crate::plan::{Left, Plan, Stretch};
 use crate::sweep::{MissedPoints, Unswept, missed};
@@ -29,6 +30,9 @@ pub struct LeftOut {
     /// the arm meets something at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free_from: Option<FreeFrom>,
+    /// What a longer tool would come to: for what the arm meets something at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longer: Option<Longer>,
     /// The patches.
     #[serde(skip)]
     pub(super) of: Vec<usize>,
@@ -62,7 +66,8 @@ impl std::fmt::Display for LeftOut {
             }
             (_, None) => Ok(()),
         }?;
-        self.free_from.as_ref().map_or(Ok(()), |free| write!(f, "; {free}"))
+        self.free_from.as_ref().map_or(Ok(()), |free| write!(f, "; {free}"))?;
+        self.longer.map_or(Ok(()), |longer| write!(f, "; {longer}"))
     }
 }
 
@@ -133,7 +138,7 @@ pub(super) fn left_out(cell: Workcell<'_>, known: &Known<'_>) -> Vec<LeftOut> {
             let short = short.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
             let share = points.len() as f64 / total;
             let (cause, patches, of) = (cause.clone(), of.len(), of.into_iter().collect());
-            LeftOut { cause, patches, share, short, free_from: None, of, points }
+            LeftOut { cause, patches, share, short, free_from: None, longer: None, of, points }
         })
         .collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));

@@ -49,7 +49,7 @@ impl Planning<'_> {
         let tool = self.job.tool.on(self.cell.arm);
         let on_surface = visit.leg.joints.iter().zip(&visit.leg.line).filter(|(_, l)| l.is_some());
         let poses: Vec<_> = on_surface.map(|(q, _)| tool.pose(q)).collect();
-        let swept = coverage::swept(self.scan, &poses, &self.job.tool);
+        let swept = coverage::swept(self.sight, &poses, &self.job.tool);
         let counts = |i: &u32| {
             let i = *i as usize;
             swept[i] && self.to_sweep[i] && !self.already[i]

@@ -17,6 +17,9 @@ use crate::workcell::{Sample, middle_out, redundancies};
 /// Farthest that strips are joined along the surface, as a share of the pad's length: it goes from
 /// one strip to the next.
 const JOIN: f64 = 1.5;
+/// Farthest between neighbouring patches of a face, \[m\] and in radii of a patch's neighbourhood.
+const NEAR_FACE: f64 = 0.10;
+const NEAR_RADII: f64 = 2.5;
 /// What lifting off counts as, in lengths of way. \[m\]
 const LIFT: f64 = 1.0;
 /// Turns of the pad from along its strip that are tried, in their order. \[°\]
@@ -52,7 +55,8 @@ impl Rasters {
 impl Planning<'_> {
     /// The rasters of the faces of the patches that are marked.
     pub(super) fn rasters(&self, patches: &[Patch], marked: &[bool]) -> Rasters {
-        let faces = Face::all(self.scan, patches, marked);
+        let near = NEAR_FACE.max(NEAR_RADII * self.job.patches.epsilon);
+        let faces = Face::all(self.scan, patches, marked, near);
         let of = |face: &Face| face.rasters(self.scan, self.bed, &self.job.tool);
         Rasters(faces.par_iter().map(of).collect())
     }
@@ -119,7 +123,7 @@ impl Planning<'_> {
     }
 
     fn join(&self) -> f64 {
-        JOIN * self.job.tool.length
+        JOIN * self.job.tool.track()[0]
     }
 
     /// The strips as far as the arm comes to their places, cut where it does not, those of
@@ -154,6 +158,9 @@ impl Planning<'_> {
         let Self { job, cell, .. } = *self;
         let values = middle_out(redundancies(cell.arm.ik().redundancy_range(), job.ik_samples));
         TURNS.map(|turn| {
+            if !job.tool.may_travel(turn.to_radians()) {
+                return None;
+            }
             let heading = place.heading + turn.to_radians();
             let stop = Stop { patch: 0, heading };
             let contact = pose(std::slice::from_ref(&place.patch), cell.tool, &stop);

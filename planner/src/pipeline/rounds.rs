@@ -225,6 +225,7 @@ impl<'a> Planning<'a> {
             stance: self.stance,
             cell: self.cell,
             scan: self.scan,
+            sight: self.sight,
             bed: self.bed,
             start,
             velocity: self.velocity,

@@ -13,6 +13,7 @@ use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
 use super::left_out::{Known, LeftOut, in_words, left_out, missed_by};
+use super::longer::longer;
 use super::rounds::Course;
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
@@ -23,7 +24,7 @@ use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::regions::Label;
 use crate::roadmap::Graph;
-use crate::sweep::{Held, Passes, passes_over};
+use crate::sweep::{Held, Passes, Sight, passes_over, solids};
 use crate::timing::Rest;
 use crate::verify::{Given, verify};
 use crate::workcell::{Bed, Scene, Workcell, reach};
@@ -63,6 +64,9 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<Outcome, PipelineError> {
     job.after.as_ref().map_or(Ok(()), |after| after.plan.check_bounds())?;
+    if job.tool.own_speed().is_some() && !job.profile.is_curved() {
+        return Err(PipelineError::NoSpeed { tool: job.tool.name.clone() });
+    }
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
@@ -92,12 +96,15 @@ pub fn run(
     }
     let (found, samples) = (patches.clone(), reached);
     let bed = clock.time("surface", || Bed::new(&here, &job.tool));
+    let solids = solids(&here, &job.tool, &job.collision)?;
+    let sight = Sight::of(&here, solids.as_ref());
     let planning = Planning {
         robot,
         job,
         stance: &stance,
         cell,
         scan,
+        sight,
         bed: &bed,
         start,
         velocity: cost::velocities(&arm, job.v_max),
@@ -119,7 +126,10 @@ pub fn run(
     let dropped = &sequence.dropped;
     let known = Known { scan, patches: &found, reachable: &reachable, dropped, swept: &done };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
-    let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
+    let left_out = clock.time("causes", || {
+        let rows = advise(left_out(cell, &known), &others, &floor)?;
+        longer(rows, &stance, &floor)
+    })?;
     plan.left = left_out.iter().map(LeftOut::told).collect();
     plan.left.extend(course.unwanted(&verification.swept));
     // A stroke leads to a place that has no points of its own.
@@ -135,7 +145,7 @@ pub fn run(
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
-        passes: Passes::of(&passes_over(scan, [plan.trajectory()], &arm)),
+        passes: Passes::of(&passes_over(sight, [plan.trajectory()], &arm)),
         rounds,
         tool_speed: job.tool_speed.map(|speed| Held::of(plan.trajectory(), &arm, speed)),
         verification,

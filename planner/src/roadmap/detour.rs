@@ -29,7 +29,7 @@ impl Workcell<'_> {
     /// without redundancy. What [`Self::follow`] promises of its tracks holds for this one too.
     #[must_use]
     pub fn detour(&self, path: &ToolPath, from: &[Sample], to: &[Sample]) -> Option<Track> {
-        let range = self.arm.ik().redundancy_range()?;
+        let range = self.arm.ik().redundancy_range().filter(|_| path.is_for(self.tool))?;
         let mut branches: Vec<Branch> = from.iter().map(|sample| sample.branch).collect();
         branches.sort_unstable();
         branches.dedup();

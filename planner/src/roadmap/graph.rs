@@ -138,7 +138,7 @@ pub fn of_steps(
     let tried: Vec<Option<Edge>> = steps
         .par_iter()
         .map(|&[(a, from), (b, to)]| {
-            let edge = Edge::between(bed, patches, a, b, config, cell.tool.width)?;
+            let edge = Edge::between(bed, patches, a, b, config, cell.tool.track()[1])?;
             let mut turned = TurnedEdge::at(cell, patches, edge, [from, to]);
             turned.is_followed(cell, &values).then_some(turned.edge)
         })
@@ -157,9 +157,10 @@ fn join(
     (a, b): (usize, usize),
 ) -> Option<Edge> {
     let Nodes { bed, patches, .. } = nodes;
-    let edge = Edge::between(bed, patches, a, b, config, cell.tool.width)?;
+    let edge = Edge::between(bed, patches, a, b, config, cell.tool.track()[1])?;
+    let turns = TURNS.iter().filter(|turn| cell.tool.may_travel(turn.to_radians()));
     let mut turned: Vec<TurnedEdge> =
-        TURNS.iter().map(|turn| TurnedEdge::new(cell, patches, &edge, *turn)).collect();
+        turns.map(|turn| TurnedEdge::new(cell, patches, &edge, *turn)).collect();
     let even = turned.iter_mut().position(|edge| edge.is_followed(cell, values));
     let found = even.or_else(|| turned.iter().position(|edge| edge.has_detour(cell, values)))?;
     Some(turned.swap_remove(found).edge)

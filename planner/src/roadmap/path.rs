@@ -1,7 +1,7 @@
 //! The pad's way along an edge.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use nullsweep_robot::wrap;
+use nullsweep_robot::{Tool, wrap};
 use nullsweep_surface::SurfacePoint;
 
 use super::edge::Edge;
@@ -23,6 +23,8 @@ struct Station {
     travel: Vector3<f64>,
     /// Share of the path's length up to here, 0…1.
     share: f64,
+    /// Of the pad from the line. \[rad\]
+    turn: f64,
 }
 
 impl ToolPath {
@@ -48,7 +50,13 @@ impl ToolPath {
             if i > 0 {
                 share += (here.point - before).norm() / length;
             }
-            stations.push(Station { point: here.point, normal: here.normal, travel, share });
+            stations.push(Station {
+                point: here.point,
+                normal: here.normal,
+                travel,
+                share,
+                turn: 0.0,
+            });
         }
         let (first, last) = (stations[0], stations[stations.len() - 1]);
         let start = turn(&first, from);
@@ -56,9 +64,15 @@ impl ToolPath {
         let swing = wrap(end - start);
         for s in &mut stations {
             let angle = start + swing * s.share;
+            s.turn = angle;
             s.travel = s.travel * angle.cos() + s.normal.cross(&s.travel) * angle.sin();
         }
         Self { stations, stand_off }
+    }
+
+    /// Whether a tool may travel along it all the way, turned from it as it is.
+    pub(super) fn is_for(&self, tool: &Tool) -> bool {
+        self.stations.iter().all(|station| tool.may_travel(station.turn))
     }
 
     /// How many points the surface line has, at least two.

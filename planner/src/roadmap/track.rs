@@ -28,6 +28,8 @@ pub enum TrackFailure {
     Collision,
     /// The branch does not arrive at the sample asked for.
     Elsewhere,
+    /// A roller would be moved sideways.
+    Sideways,
 }
 
 /// Where along a tool path it could not be followed, and why.
@@ -66,6 +68,9 @@ impl Workcell<'_> {
         };
         if from.branch != to.branch {
             return Err(blocked(last, TrackFailure::Elsewhere));
+        }
+        if !path.is_for(self.tool) {
+            return Err(blocked(0, TrackFailure::Sideways));
         }
         let mut run = Follower::new(*self, path, from);
         for station in 1..=last {

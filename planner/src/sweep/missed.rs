@@ -1,6 +1,6 @@
 //! Why a point that the arm reaches is not swept, as the plan's motion shows it.
 
-use nullsweep_robot::Arm;
+use nullsweep_robot::{Arm, Footprint};
 use nullsweep_surface::{Grid, Scan};
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +11,10 @@ use crate::plan::Trajectory;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Missed {
+    /// The nozzle sprays it, but too little or too much comes to lie on it.
+    Deposit,
+    /// It is before the camera, but something stands between.
+    Hidden,
     /// The pad passes over it, but its normal is farther off the pad's than the tool works.
     Aslant,
     /// The pad passes over it, but it lies too high or too deep.
@@ -25,13 +29,22 @@ pub enum Missed {
 
 impl Missed {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Self; 5] =
-        [Self::Aslant, Self::OffPlane, Self::Touched, Self::NoMotion, Self::Beside];
+    pub const ALL: [Self; 7] = [
+        Self::Deposit,
+        Self::Hidden,
+        Self::Aslant,
+        Self::OffPlane,
+        Self::Touched,
+        Self::NoMotion,
+        Self::Beside,
+    ];
 }
 
 impl std::fmt::Display for Missed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
+            Self::Deposit => "sprayed, but too little or too much",
+            Self::Hidden => "before the camera, but hidden",
             Self::Aslant => "passed over, but too aslant",
             Self::OffPlane => "passed over, but too high or too deep",
             Self::Touched => "under a mere touch",
@@ -81,7 +94,7 @@ pub fn missed<'a>(
     left.no_motion.iter().for_each(|&i| why[i as usize] = Missed::NoMotion);
     for motion in motions {
         let tool = motion.tool;
-        let reach = (0.5 * tool.width.hypot(tool.length)).hypot(OVER.max(tool.reach_normal));
+        let reach = tool.outer_radius().hypot(OVER.max(tool.reach_normal));
         let grid = Grid::new(&scan.points, 0.5 * reach);
         let strokes = contact_motion(motion, arm).into_iter().map(|pose| (pose, false));
         let mounted = tool.on(arm);
@@ -91,17 +104,18 @@ pub fn missed<'a>(
             let centre = nalgebra::Point3::from(pose.translation.vector + z.scale(tool.stand_off));
             grid.within(&centre, reach, |index, point, _| {
                 let (i, offset) = (index as usize, point - centre);
-                let is_under = offset.dot(&x).abs() <= 0.5 * tool.width
-                    && offset.dot(&y).abs() <= 0.5 * tool.length
+                let is_under = tool.is_under(offset.dot(&x), offset.dot(&y))
                     && offset.dot(&z).abs() <= OVER.max(tool.reach_normal);
                 if !is_under || !is_open(i) {
                     return;
                 }
                 let near = offset.dot(&z).abs() <= tool.reach_normal;
                 let facing = -scan.normals[i].dot(&z) >= tool.reach_angle.cos();
-                let now = match (near, facing) {
-                    (true, true) if is_touch => Missed::Touched,
-                    (true, false) => Missed::Aslant,
+                let now = match (near, facing, tool.footprint) {
+                    (true, true, _) if is_touch => Missed::Touched,
+                    (true, true, Footprint::Nozzle(_)) => Missed::Deposit,
+                    (true, true, Footprint::Camera(_)) => Missed::Hidden,
+                    (true, false, _) => Missed::Aslant,
                     _ => Missed::OffPlane,
                 };
                 why[i] = why[i].min(now);

@@ -2,6 +2,7 @@
 //! over.
 
 pub mod coverage;
+mod deposit;
 mod held;
 mod missed;
 mod pace;
@@ -9,7 +10,10 @@ mod pads;
 mod passes;
 mod percentile;
 mod segment;
+mod sight;
+mod view;
 
+pub use deposit::{Clock, deposits};
 pub use held::{Held, Slower};
 pub use missed::{Missed, MissedPoints, Unswept, missed};
 pub use pace::{DIP, JointPace, Pace};
@@ -17,3 +21,4 @@ pub use pads::{Pad, contact_motion, pad_motion};
 pub use passes::{Passes, passes_over};
 pub(crate) use percentile::percentile;
 pub use segment::distance_to_segment;
+pub use sight::{Sight, solids};

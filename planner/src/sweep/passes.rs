@@ -1,12 +1,12 @@
 //! How often the pad passes over each point.
 
 use nullsweep_robot::Arm;
-use nullsweep_surface::Scan;
 use serde::{Deserialize, Serialize};
 
-use super::coverage::visit_swept;
+use super::coverage::{enough, visit_swept};
 use super::pads::contact_motion;
 use super::percentile::percentile;
+use super::sight::Sight;
 use crate::plan::Trajectory;
 
 /// So many passes and more are counted together.
@@ -28,14 +28,17 @@ pub struct Passes {
 /// when the pad comes over a point to when it has left it.
 #[must_use]
 pub fn passes_over<'a>(
-    scan: &Scan,
+    sight: impl Into<Sight<'a>>,
     motions: impl IntoIterator<Item = Trajectory<'a>>,
     arm: &Arm,
 ) -> Vec<u32> {
-    let mut counts = vec![0; scan.points.len()];
+    let sight = sight.into();
+    let points = sight.scan.points.len();
+    let mut counts = vec![0; points];
     for motion in motions {
-        let mut last = vec![None; scan.points.len()];
-        visit_swept(scan, &contact_motion(motion, arm), motion.tool, |pose, point| {
+        let mut last = vec![None; points];
+        let poses = enough(&contact_motion(motion, arm), motion.tool);
+        visit_swept(sight, &poses, motion.tool, |pose, point| {
             counts[point] += u32::from(last[point].is_none_or(|last: usize| last + 1 != pose));
             last[point] = Some(pose);
         });

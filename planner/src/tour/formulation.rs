@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 use nullsweep_gtsp::{
     self as gtsp, Block, Budget, Costs, Ends, Instance, InstanceError, Jump, SolveError,
 };
@@ -140,11 +140,12 @@ fn apart(patches: &[Patch], patch: usize, here: &Isometry3<f64>) -> f64 {
     (patches[patch].centre.coords - here.translation.vector).norm()
 }
 
-/// A stop for each heading in which an edge leaves the patch; one for a lone patch.
+/// A stop for each heading in which an edge leaves the patch; one for a lone patch, and for a round
+/// tool, whose heading is free.
 #[must_use]
-pub fn incident_stops(graph: &Graph, patch: usize) -> Vec<Stop> {
+pub fn incident_stops(graph: &Graph, patch: usize, tool: &Tool) -> Vec<Stop> {
     let edges = &graph.incident[patch];
-    if edges.is_empty() {
+    if edges.is_empty() || tool.is_round() {
         return vec![Stop { patch, heading: 0.0 }];
     }
     edges.iter().map(|&e| Stop { patch, heading: graph.edges[e].leaving(patch) }).collect()
@@ -158,16 +159,12 @@ pub fn pose(patches: &[Patch], tool: &Tool, stop: &Stop) -> Isometry3<f64> {
     contact_pose(&patch.centre, &patch.normal, &travel, tool.stand_off)
 }
 
-/// The weighed distance of two contact frames (Eq. 4); for a symmetric pad the smaller of the
-/// two turns. \[m and rad, weighed\]
+/// The weighed distance of two contact frames (Eq. 4), by the smallest of the turns that are as good.
+/// \[m and rad, weighed\]
 #[must_use]
-pub fn curvature(a: &Isometry3<f64>, b: &Isometry3<f64>, beta: f64, symmetric: bool) -> f64 {
+pub fn curvature(a: &Isometry3<f64>, b: &Isometry3<f64>, beta: f64, tool: &Tool) -> f64 {
     let between = a.inv_mul(b);
-    let mut angle = between.rotation.angle();
-    if symmetric {
-        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
-        angle = angle.min((between.rotation * half_turn).angle());
-    }
+    let angle = tool.turn_between(&between.rotation);
     (1.0 - beta) * between.translation.vector.norm() + beta * angle
 }
 
@@ -195,8 +192,8 @@ impl Problem<'_> {
     /// The way of least length and turning.
     fn smoothest(&self, seed: u64) -> Result<Vec<Stop>, FormulationError> {
         let nodes: Vec<Vec<Stop>> =
-            self.component.iter().map(|&patch| incident_stops(self.graph, patch)).collect();
-        self.search(&nodes, seed, |a, b| curvature(a, b, self.config.beta, self.tool.symmetric))
+            self.component.iter().map(|&patch| incident_stops(self.graph, patch, self.tool)).collect();
+        self.search(&nodes, seed, |a, b| curvature(a, b, self.config.beta, self.tool))
     }
 
     /// The pad heads where it goes next (but for the edge's turn); at the end, and before a jump,
@@ -211,7 +208,7 @@ impl Problem<'_> {
                     let previous = *order.get(i.checked_sub(1)?)?;
                     edge(previous, patch).map(|e| e.leaving(patch) + std::f64::consts::PI)
                 };
-                let any = || incident_stops(self.graph, patch)[0].heading;
+                let any = || incident_stops(self.graph, patch, self.tool)[0].heading;
                 Stop { patch, heading: next.or_else(before).unwrap_or_else(any) }
             })
             .collect()

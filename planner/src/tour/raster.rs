@@ -17,14 +17,10 @@ use crate::workcell::{Bed, heading_of, tangents};
 
 /// The greatest angle between a patch's normal and its face's. \[rad\]
 const BENT: f64 = 0.6;
-/// Farthest between neighbouring patches of a face. \[m\]
-const NEIGHBOUR: f64 = 0.10;
-/// What strips side by side share. \[m\]
-const OVERLAP: f64 = 0.008;
-/// Farthest between two places of a strip. \[m\]
+/// Farthest between two places of a strip, \[m\] and of a tool that works from afar as a share of what
+/// it works on along the travel.
 const SPACING: f64 = 0.045;
-/// How much less than half its width the pad stays within a strip's ends. \[m\]
-const BEYOND: f64 = 0.005;
+const SPACING_SHARE: f64 = 0.5;
 /// A gap that is longer than this cuts a strip, as a share of the pad's width.
 const GAP: f64 = 1.0;
 /// Farthest from a point of the face, seen along its normal, that the surface is looked for. \[m\]
@@ -57,12 +53,12 @@ pub struct Face {
 }
 
 impl Face {
-    /// The faces of the patches that are marked.
+    /// The faces of the patches that are marked, neighbours in them no farther than `neighbour` \[m\].
     #[must_use]
-    pub fn all(scan: &Scan, patches: &[Patch], marked: &[bool]) -> Vec<Self> {
+    pub fn all(scan: &Scan, patches: &[Patch], marked: &[bool], neighbour: f64) -> Vec<Self> {
         let mut open: Vec<bool> = marked.to_vec();
         let alike = |a: &UnitVector3<f64>, b: &UnitVector3<f64>| a.dot(b) >= BENT.cos();
-        let near = |a: &Patch, b: &Patch| (a.centre - b.centre).norm() <= NEIGHBOUR;
+        let near = |a: &Patch, b: &Patch| (a.centre - b.centre).norm() <= neighbour;
         let mut faces = Vec::new();
         loop {
             // Where most patches lie alike there is the middle of a face.
@@ -71,7 +67,7 @@ impl Face {
                 others
                     .filter(|&k| {
                         let apart = (patches[k].centre - patches[i].centre).norm();
-                        apart <= 2.0 * NEIGHBOUR
+                        apart <= 2.0 * neighbour
                             && patches[k].normal.dot(&patches[i].normal) >= (0.5 * BENT).cos()
                     })
                     .count()
@@ -144,7 +140,10 @@ impl Face {
             })
             .collect();
         let (low, high) = extent(flat.iter().map(|p| p.v));
-        let count = ((high - low) / (tool.length - OVERLAP).max(0.5 * tool.length)).ceil().max(1.0);
+        let count = ((high - low) / tool.pitch()).ceil().max(1.0);
+        let [_, length] = tool.track();
+        let spacing =
+            if tool.touches() { SPACING } else { SPACING.max(SPACING_SHARE * length) };
         let band = (high - low) / count;
         let mut strips = Vec::new();
         for k in 0..count as usize {
@@ -152,11 +151,11 @@ impl Face {
             let within = flat.iter().filter(|p| (p.v - middle).abs() <= 0.5 * band);
             let mut us: Vec<f64> = within.map(|p| p.u).collect();
             us.sort_by(f64::total_cmp);
-            for run in us.chunk_by(|a, b| b - a <= GAP * tool.width) {
+            for run in us.chunk_by(|a, b| b - a <= GAP * length) {
                 let (from, to) = (run[0], run[run.len() - 1]);
-                let inset = (0.5 * tool.width - BEYOND).min(0.5 * (to - from));
+                let inset = tool.strip_inset().min(0.5 * (to - from));
                 let (from, to) = (from + inset, to - inset);
-                let pieces = ((to - from) / SPACING).ceil().max(1.0);
+                let pieces = ((to - from) / spacing).ceil().max(1.0);
                 let stations = if to - from < SHORT { 0 } else { pieces as usize };
                 let at = |s: usize| {
                     let share = if stations == 0 { 0.5 } else { s as f64 / stations as f64 };
@@ -212,8 +211,7 @@ impl Face {
         bed: &Bed,
         tool: &Tool,
     ) -> Option<Place> {
-        let beside =
-            |p: &&Flat| (p.u - u).abs() <= 0.5 * tool.width && (p.v - v).abs() <= 0.5 * tool.length;
+        let beside = |p: &&Flat| tool.is_under(p.u - u, p.v - v);
         let points: Vec<u32> = flat.iter().filter(beside).map(|p| p.index).collect();
         let patch = Patch { centre: foot.point, normal: foot.normal, points, rmse: 0.0 };
         let patch = bed.laid(patch)?;
@@ -310,7 +308,7 @@ mod tests {
         let (scan, tool) = (floor(), Tool::default());
         let bed = Bed::new(&Scene::on_floor(scan.clone()), &tool);
         let found = patches::find(&scan, &PatchConfig::default(), 1);
-        let faces = Face::all(&scan, &found, &vec![true; found.len()]);
+        let faces = Face::all(&scan, &found, &vec![true; found.len()], 0.10);
         assert_eq!(faces.len(), 1);
         let rasters = faces[0].rasters(&scan, &bed, &tool);
         // Four strips of 40 cm are less way than five of 30.

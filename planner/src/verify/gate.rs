@@ -11,10 +11,12 @@ use super::collisions::{collisions, standing};
 use super::keep_out::keep_out;
 use super::kinematics::kinematics;
 use super::press::{Press, press};
+use super::slip::slip;
+use super::stand_off::{StandOff, stand_off};
 use super::violation::{Violation, ViolationKind};
-use crate::plan::{Plan, PlanError, Stretch};
+use crate::plan::{Plan, PlanError, Stretch, Trajectory};
 use crate::regions::{Label, Mark, RegionFigures};
-use crate::sweep::{Pad, coverage, pad_motion, passes_over, percentile};
+use crate::sweep::{Pad, Sight, coverage, pad_motion, passes_over, percentile, solids};
 use crate::workcell::Scene;
 
 /// The figures of a verified plan.
@@ -34,6 +36,9 @@ pub struct Verification {
     /// How the pad lies on the surface.
     #[serde(flatten)]
     pub press: Press,
+    /// How a tool that works from afar stands before it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stand_off: Option<StandOff>,
     /// What the arm was held against.
     pub against: Against,
     /// Share of all scanned points that are swept, by this plan or by those that led to it.
@@ -208,15 +213,18 @@ pub fn verify(
     let (collisions, collision_checks) = collisions(plan, &arm, &exact, tick);
     violations.extend(collisions);
     violations.extend(keep_out(plan, &arm, &scene.keep_out));
+    violations.extend(slip(plan, &arm));
+    let (stand_off, too_far) = stand_off(plan, &arm, scan);
+    violations.extend(too_far);
     violations.sort_by_key(|v| v.knot);
 
     let pads = pad_motion(plan.trajectory(), &arm);
     let line_deviation_max_m = pads.iter().map(|p| p.deviation).fold(0.0, f64::max);
     let distances = if is_scanned { distances(plan, scan, &pads) } else { Vec::new() };
     let poses: Vec<Isometry3<f64>> = pads.iter().map(|p| p.pose).collect();
-    let mut swept = coverage::swept(scan, &poses, &plan.tool);
-    let before = coverage::swept_by(scan, plan.past.iter().map(Stretch::trajectory), &arm);
-    swept.iter_mut().zip(before).for_each(|(now, before)| *now |= before);
+    let solids = solids(&scene, &plan.tool, given.collision)?;
+    let sight = Sight::of(&scene, solids.as_ref());
+    let swept = coverage::swept_by(sight, motions(plan), &arm);
     let share = |of: &dyn Fn(usize) -> bool| {
         let total = (0..swept.len()).filter(|&i| of(i)).count();
         let hit = (0..swept.len()).filter(|&i| of(i) && swept[i]).count();
@@ -227,12 +235,17 @@ pub fn verify(
         collision_checks,
         line_deviation_max_m,
         scan_distance_p95_m: percentile(&distances, 0.95),
-        press: press(&scene, &poses, &plan.tool),
+        press: if plan.tool.touches() {
+            press(&scene, &poses, &plan.tool)
+        } else {
+            Press::default()
+        },
+        stand_off,
         against: Against::of(&scene, &exact),
         scan_distance_max_m: distances.last().copied().unwrap_or(0.0),
         coverage_all: share(&|_| true),
         coverage_reachable: share(&|i| plan.surface[i].reachable),
-        regions: by_region(plan, &arm, &scene, &labels),
+        regions: by_region(plan, &arm, &scene, (sight, &labels)),
         swept,
     })
 }
@@ -267,13 +280,22 @@ fn same_regions(plan: &Plan, found: &[Mark]) -> Result<(), VerifyError> {
     Ok(())
 }
 
+/// All that was followed, and the plan's own motion.
+fn motions(plan: &Plan) -> impl Iterator<Item = Trajectory<'_>> {
+    plan.past.iter().map(Stretch::trajectory).chain([plan.trajectory()])
+}
+
 /// What came of each region: of this plan, and of those that led to it.
-fn by_region(plan: &Plan, arm: &Arm, scene: &Scene, labels: &[Label]) -> Vec<RegionFigures> {
+fn by_region(
+    plan: &Plan,
+    arm: &Arm,
+    scene: &Scene,
+    (sight, labels): (Sight<'_>, &[Label]),
+) -> Vec<RegionFigures> {
     if scene.regions.is_empty() || labels.is_empty() {
         return Vec::new();
     }
-    let motions = plan.past.iter().map(Stretch::trajectory).chain([plan.trajectory()]);
-    let passes = passes_over(&scene.surface, motions, arm);
+    let passes = passes_over(sight, motions(plan), arm);
     let reachable: Vec<bool> = plan.surface.iter().map(|sample| sample.reachable).collect();
     RegionFigures::all(&scene.regions, labels, &passes, &reachable)
 }
@@ -296,6 +318,9 @@ fn distances(plan: &Plan, scan: &Scan, pads: &[Pad]) -> Vec<f64> {
     let mut distances: Vec<f64> = pads
         .par_iter()
         .map(|p| {
+            if !plan.tool.touches() {
+                return surface.distance(&(p.pose * Point3::new(0.0, 0.0, plan.tool.stand_off)));
+            }
             let centre = Point3::from(p.pose.translation.vector);
             (surface.distance(&centre) - plan.tool.stand_off.max(0.0)).abs()
         })

@@ -19,8 +19,12 @@ pub(super) fn keep_out(plan: &Plan, arm: &Arm, points: &[Point3<f64>]) -> Vec<Vi
         return Vec::new();
     }
     let tool = &plan.tool;
-    let (half, z) = (0.5 * tool.width.hypot(tool.length), worked(tool));
-    let reach = half.hypot(z[0].abs().max(z[1].abs()));
+    let z = worked(tool);
+    let reach = if tool.touches() {
+        tool.outer_radius().hypot(z[0].abs().max(z[1].abs()))
+    } else {
+        tool.farthest()
+    };
     let grid = Grid::new(points, 0.5 * reach);
     let pad = tool.on(arm);
     let touched = |k: usize| {
@@ -31,8 +35,12 @@ pub(super) fn keep_out(plan: &Plan, arm: &Arm, points: &[Point3<f64>]) -> Vec<Vi
             let mut first = None;
             grid.within(&pose.translation.vector.into(), reach, |_, point, _| {
                 let own = pose.inverse_transform_point(point);
-                let inside = own.x.abs() <= 0.5 * tool.width && own.y.abs() <= 0.5 * tool.length;
-                if first.is_none() && inside && (z[0]..=z[1]).contains(&own.z) {
+                let inside = if tool.touches() {
+                    tool.is_under(own.x, own.y) && (z[0]..=z[1]).contains(&own.z)
+                } else {
+                    tool.works_on(own.x, own.y, own.z - tool.stand_off)
+                };
+                if first.is_none() && inside {
                     first = Some(*point);
                 }
             });

@@ -13,8 +13,11 @@ mod gate;
 mod keep_out;
 mod kinematics;
 mod press;
+mod slip;
+mod stand_off;
 mod violation;
 
 pub use gate::{Against, Given, Verification, VerifyError, same_scan, verify};
 pub use press::{Press, press_depths};
+pub use stand_off::StandOff;
 pub use violation::{Violation, ViolationKind};

@@ -53,7 +53,7 @@ fn contacts(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Vec<Contact
     let surface = &scene.surface;
     let points: Vec<Point3<f64>> =
         surface.points.iter().chain(&scene.surroundings).copied().collect();
-    let reach = 0.5 * tool.width.hypot(tool.length);
+    let reach = tool.outer_radius();
     let grid = Grid::new(&points, reach);
     let look = |pose: &Isometry3<f64>| {
         let centre = Point3::from(pose.translation.vector);
@@ -66,7 +66,7 @@ fn contacts(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Vec<Contact
                 nearest = (squared, normal);
             }
             let p = pose.inverse_transform_point(point);
-            let inside = p.x.abs() <= 0.5 * tool.width && p.y.abs() <= 0.5 * tool.length;
+            let inside = tool.is_under(p.x, p.y);
             if inside && (-tool.thickness..=UNDER).contains(&p.z) {
                 deepest = deepest.max(-p.z);
                 let faces = normal.is_some_and(|n| -n.dot(&axis) >= tool.reach_angle.cos());

@@ -34,4 +34,8 @@ pub enum ViolationKind {
     Collision,
     /// The pad touches what it is to keep out of.
     KeepOut,
+    /// A tool that works from afar is too near, too far or too aslant.
+    StandOff,
+    /// A roller is moved sideways.
+    Slip,
 }

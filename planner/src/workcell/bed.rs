@@ -42,7 +42,8 @@ pub struct Bed {
     highest: f64,
     /// Cosine of the largest angle between the pad's axis and the normal under its centre.
     facing: f64,
-    /// How far before the line that it is led along the pad's centre is; negative: behind. \[m\]
+    /// How far before the line that it is led along the pad's centre is; negative: behind; 0 of a tool
+    /// that works from afar, which faces what is on the line. \[m\]
     stand_off: f64,
 }
 
@@ -53,12 +54,17 @@ impl Bed {
         let Scene { surface, surroundings, raw, .. } = scene;
         let points: Vec<Point3<f64>> =
             surface.points.iter().chain(surroundings).chain(raw).copied().collect();
-        let deepest = (tool.press_max - SPARE).max(0.0) + tool.stand_off;
-        let highest = HIGHEST - tool.stand_off.min(0.0);
+        // Nothing presses on a tool that works from afar.
+        let (deepest, highest) = if tool.touches() {
+            let deepest = (tool.press_max - SPARE).max(0.0) + tool.stand_off;
+            (deepest, HIGHEST - tool.stand_off.min(0.0))
+        } else {
+            (f64::INFINITY, 0.0)
+        };
         let (surface, radius) = (Surface::new(surface), 0.5 * tool.length.max(tool.width));
         let grid = Grid::new(&points, radius);
         let facing = tool.reach_angle.cos();
-        let stand_off = tool.stand_off;
+        let stand_off = if tool.touches() { tool.stand_off } else { 0.0 };
         Self { surface, points, grid, radius, deepest, highest, facing, stand_off }
     }
 

@@ -1,7 +1,5 @@
 //! Why the pad does not come to a place: of all that is in the way, what comes nearest to letting it.
 
-use std::f64::consts::TAU;
-
 use nullsweep_collision::{Hit, ToolContact, With};
 use nullsweep_robot::{JointVector, Solutions};
 use nullsweep_surface::Patch;
@@ -103,7 +101,7 @@ const POSTURES: usize = 24;
 pub fn obstruction(cell: Workcell<'_>, patch: &Patch) -> Obstruction {
     let Workcell { arm, tool, world } = cell;
     let values = redundancies(arm.ik().redundancy_range(), REDUNDANCIES);
-    let turn = if tool.symmetric { 0.5 } else { 1.0 } * TAU;
+    let turn = tool.heading_range();
     let (mut inside, mut outside) = (Vec::new(), None::<Obstruction>);
     let mut solutions = Solutions::new();
     for heading in (0..HEADINGS).map(|h| turn * h as f64 / HEADINGS as f64) {

@@ -1,7 +1,5 @@
 //! Which patches the arm reaches.
 
-use std::f64::consts::TAU;
-
 use nullsweep_surface::Patch;
 use rayon::prelude::*;
 
@@ -25,7 +23,7 @@ pub fn reach(
     patches
         .par_iter()
         .map(|patch| {
-            let turn = if cell.tool.symmetric { 0.5 } else { 1.0 } * TAU;
+            let turn = cell.tool.heading_range();
             let found = (0..HEADINGS).find_map(|h| {
                 let heading = turn * h as f64 / HEADINGS as f64;
                 let travel = direction(&patch.normal, heading);

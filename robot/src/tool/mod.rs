@@ -1,17 +1,25 @@
-//! The tool that touches the surface: a rectangular pad at the end of the arm.
+//! The tool at the end of the arm: what touches the surface, sprays it or looks at it.
 
-use std::f64::consts::PI;
+mod error;
+mod file;
+mod footprint;
+
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{
     Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
-use serde::de::Error;
+use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+pub use self::error::ToolError;
+use self::file::ToolFile;
+pub use self::footprint::{Camera, Footprint, Nozzle, Roller, ToolBody};
 use crate::arm::Arm;
 use crate::joints::JointVector;
 
-/// A rectangular pad (sponge, brush, squeegee) and how it sits on the arm's tip frame.
+/// A pad (sponge, brush, squeegee), roller, nozzle or camera, and how it sits on the arm's tip frame.
+/// What is said of a pad here holds for the others as [`Footprint`] says.
 ///
 /// Its *contact frame* has the pad's centre as origin, x along the direction of travel, z into
 /// the surface (against the surface normal) and y = z × x along the pad's long side, so that the
@@ -25,13 +33,16 @@ use crate::joints::JointVector;
 /// 8 mm of reach touches to 4 mm before its plane, which is what a depth camera is uncertain by two
 /// metres away. A tool that works from afar stands off.
 ///
+/// A nozzle or camera has its mouth or lens at the contact frame's origin, `stand_off` before the
+/// surface; a camera sweeps what it sees, a nozzle what it lays enough onto and not too much.
+///
 /// One that is read from a file has passed [`Tool::check`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(remote = "Self", deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// For people.
     pub name: String,
-    /// Long side of the pad, across the travel, the contact frame's y. \[m\]
+    /// Long side of the pad, or of the body of what works from afar, across the travel, the contact
+    /// frame's y. \[m\]
     pub length: f64,
     /// Short side of the pad, along the travel, the contact frame's x. \[m\]
     pub width: f64,
@@ -48,7 +59,6 @@ pub struct Tool {
     pub stand_off: f64,
     /// How far the pad's soft body may be pressed in, along its axis, anywhere in its rectangle; a
     /// third of its thickness where a file does not say it. \[m\]
-    #[serde(default = "unsaid")]
     pub press_max: f64,
     /// Whether a heading and its opposite are the same contact.
     pub symmetric: bool,
@@ -56,11 +66,8 @@ pub struct Tool {
     pub reach_normal: f64,
     /// A point is swept if its normal is within this angle of the pad's. \[rad\]
     pub reach_angle: f64,
-}
-
-/// Stands for a `press_max` that a file does not have.
-fn unsaid() -> f64 {
-    f64::NEG_INFINITY
+    /// What it is a tool for.
+    pub footprint: Footprint,
 }
 
 impl Default for Tool {
@@ -81,6 +88,7 @@ impl Default for Tool {
             symmetric: true,
             reach_normal: 0.008,
             reach_angle: 30f64.to_radians(),
+            footprint: Footprint::Rectangle,
         }
     }
 }
@@ -89,60 +97,20 @@ impl Default for Tool {
 const SIDE: (f64, f64) = (1e-4, 10.0);
 /// Farthest from the tip frame, and from the surface. \[m\]
 const FAR: f64 = 10.0;
+/// Half of the opening angle of what works from afar, least and greatest. \[rad\]
+const OPENING: (f64, f64) = (0.01, 1.3);
 /// Least sine of the angle between two axes that span a plane.
 const SPREAD: f64 = 0.01;
 
-/// Why there cannot be such a tool.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum ToolError {
-    /// A number is out of its range, or none.
-    #[error("tool: {field} is {value} {unit}: {low} to {high} {unit} is wanted")]
-    Range {
-        /// Which field.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-        /// The least.
-        low: f64,
-        /// The greatest.
-        high: f64,
-    },
-    /// An axis that points nowhere.
-    #[error(
-        "tool: {field} is {axis:?}: an axis is wanted, three finite numbers that are not all 0"
-    )]
-    Axis {
-        /// Which field.
-        field: &'static str,
-        /// What it is.
-        axis: [f64; 3],
-    },
-    /// The two axes are parallel.
-    #[error("tool: approach {approach:?} and across {across:?} are parallel: turn one of them")]
-    Parallel {
-        /// The one into the surface.
-        approach: [f64; 3],
-        /// The one along the pad's long side.
-        across: [f64; 3],
-    },
-}
-
 impl Serialize for Tool {
     fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
-        Self::serialize(self, out)
+        ToolFile::from(self).serialize(out)
     }
 }
 
 impl<'de> Deserialize<'de> for Tool {
     fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
-        let mut tool = Self::deserialize(input)?;
-        if tool.press_max == unsaid() {
-            tool.press_max = tool.thickness / 3.0;
-        }
-        tool.check().map_err(D::Error::custom)?;
-        Ok(tool)
+        ToolFile::deserialize(input)?.tool().map_err(D::Error::custom)
     }
 }
 
@@ -169,6 +137,7 @@ impl Tool {
                 return Err(ToolError::Range { field, value, unit, low, high });
             }
         }
+        self.check_footprint()?;
         let (approach, across) = (self.approach, self.across);
         let direction = |field, axis: [f64; 3]| {
             Unit::try_new(Vector3::from(axis), 1e-6)
@@ -181,6 +150,47 @@ impl Tool {
             return Err(ToolError::Parallel { approach, across });
         }
         Ok(())
+    }
+
+    /// Whether the numbers that only some shapes have can be.
+    fn check_footprint(&self) -> Result<(), ToolError> {
+        let range = |field, value: f64, unit, (low, high): (f64, f64)| {
+            let is_inside = (low..=high).contains(&value);
+            is_inside.then_some(()).ok_or(ToolError::Range { field, value, unit, low, high })
+        };
+        let order = |field, [low, high]: [f64; 2], unit| {
+            let is_ordered = low < high;
+            is_ordered.then_some(()).ok_or(ToolError::Order { field, low, high, unit })
+        };
+        let afar = |distance: [f64; 2]| {
+            range("distance[0]", distance[0], "m", SIDE)?;
+            range("distance[1]", distance[1], "m", SIDE)?;
+            order("distance", distance, "m")?;
+            range("stand_off", self.stand_off, "m", (distance[0], distance[1]))
+        };
+        match &self.footprint {
+            Footprint::Rectangle | Footprint::Disc => Ok(()),
+            Footprint::Roller(Roller { radius, slip_max }) => {
+                range("radius", *radius, "m", SIDE)?;
+                range("width", self.width, "m", (SIDE.0, 2.0 * radius))?;
+                range("press_max", self.press_max, "m", (0.0, *radius))?;
+                range("slip_max", *slip_max, "rad", (0.0, FRAC_PI_2))
+            }
+            Footprint::Nozzle(Nozzle { distance, cone, rate, deposit }) => {
+                afar(*distance)?;
+                range("cone", *cone, "rad", OPENING)?;
+                range("rate", *rate, "m³/s", (1e-12, 1.0))?;
+                range("deposit[0]", deposit[0], "m", (1e-9, SIDE.1))?;
+                range("deposit[1]", deposit[1], "m", (1e-9, SIDE.1))?;
+                order("deposit", *deposit, "m")
+            }
+            Footprint::Camera(Camera { distance, field_of_view }) => {
+                afar(*distance)?;
+                let (low, high) = (2.0 * OPENING.0, 2.0 * OPENING.1);
+                range("field_of_view[0]", field_of_view[0], "rad", (low, high))?;
+                range("field_of_view[1]", field_of_view[1], "rad", (low, high))
+            }
+        }
     }
 
     /// How far before the pad's plane a point may lie and be swept; 0 where it must be pressed in. \[m\]
