@@ -88,10 +88,25 @@ fn a_key_that_is_missing_of_another_shape_or_impossible_is_named() {
         ("roller.toml", "press_max", 0.03.into(), "press_max is 0.03 m"),
         ("spray-nozzle.toml", "cone", 1.5.into(), "cone is 1.5 rad"),
         ("spray-nozzle.toml", "rate", (-1.0).into(), "rate is -1 m³/s"),
-        ("spray-nozzle.toml", "deposit", serde_json::json!([9e-5, 1e-5]), "deposit is [0.00009, 0.00001] m"),
+        (
+            "spray-nozzle.toml",
+            "deposit",
+            serde_json::json!([9e-5, 1e-5]),
+            "deposit is [0.00009, 0.00001] m",
+        ),
         ("spray-nozzle.toml", "stand_off", 0.3.into(), "stand_off is 0.3 m"),
-        ("inspection-camera.toml", "distance", serde_json::json!([0.4, 0.2]), "distance is [0.4, 0.2] m"),
-        ("inspection-camera.toml", "field_of_view", serde_json::json!([0.8, 3.0]), "field_of_view[1] is 3 rad"),
+        (
+            "inspection-camera.toml",
+            "distance",
+            serde_json::json!([0.4, 0.2]),
+            "distance is [0.4, 0.2] m",
+        ),
+        (
+            "inspection-camera.toml",
+            "field_of_view",
+            serde_json::json!([0.8, 3.0]),
+            "field_of_view[1] is 3 rad",
+        ),
     ];
     for (name, key, value, words) in impossible {
         let said = said(name, key, Some(value));

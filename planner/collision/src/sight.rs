@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use parry3d_f64::math::{Pose, Vec3};
-use parry3d_f64::query::{Ray, RayCast};
+use parry3d_f64::query::Ray;
 use parry3d_f64::shape::SharedShape;
 
 use crate::error::CollisionError;

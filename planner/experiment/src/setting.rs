@@ -120,7 +120,7 @@ impl Setting {
     /// tool may stand the other way round.
     pub fn samples(&self, stop: &Stop, count: usize, out: &mut Vec<Sample>) {
         let range = self.arm.ik().redundancy_range();
-                let at = |value: f64, out: &mut Vec<Sample>| {
+        let at = |value: f64, out: &mut Vec<Sample>| {
             let before = out.len();
             for turn in self.tool.turns() {
                 let turned = Stop { heading: stop.heading + turn, ..*stop };

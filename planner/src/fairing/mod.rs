@@ -46,9 +46,8 @@ pub struct Keep<'a> {
 #[must_use]
 pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan {
     let mut pieces: Vec<Fair> = Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect();
-    let swept = |plan: &Plan| {
-        coverage::done_by(keep.sight, plan.trajectory(), cell.arm, keep.speed)
-    };
+    let swept =
+        |plan: &Plan| coverage::done_by(keep.sight, plan.trajectory(), cell.arm, keep.speed);
     // Of the points to sweep, and of all.
     let count = |swept: &[bool]| {
         let counts = swept.iter().zip(keep.points).filter(|(swept, counts)| **swept && **counts);

@@ -146,8 +146,9 @@ impl Choice<'_> {
 /// The plan as it is gone along: made smooth and timed as the job asks, after what comes to rest first.
 fn moved(of: &Planning<'_>, mut plan: Plan, rest: Option<&Rest>, clock: &mut Clock) -> Plan {
     let Planning { job, cell, progress, .. } = *of;
-    // A fair way of a pad may turn from its heading, which a roller's must not.
-    if job.smooth && !job.tool.rolls() {
+    // A fair way is one of a pad on the surface: it may turn from its heading, which a roller's must not,
+    // and what is worked on from afar lies elsewhere than the tool.
+    if job.smooth && job.tool.touches() && !job.tool.rolls() {
         progress.stage("fairing", None);
         let speed = job.working_speed();
         let keep = Keep { sight: of.sight, points: of.to_sweep, speed };

@@ -27,7 +27,9 @@ pub enum PipelineError {
     #[error("checking the plan: {0}")]
     Verify(#[from] VerifyError),
     /// A nozzle at bang-bang velocity.
-    #[error("{tool} lays on by its speed, and at bang-bang velocity the joints alone say how fast it goes")]
+    #[error(
+        "{tool} lays on by its speed, and at bang-bang velocity the joints alone say how fast it goes"
+    )]
     NoSpeed {
         /// The tool.
         tool: String,

@@ -66,8 +66,7 @@ mod tests {
         let board = Tool { length: 0.5, width: 0.3, ..sponge.clone() };
         assert_eq!(patches(&board), PatchConfig::default());
         let camera = Camera { distance: [0.3, 0.5], field_of_view: [0.8, 0.6] };
-        let camera =
-            Tool { stand_off: 0.4, footprint: Footprint::Camera(camera), ..sponge };
+        let camera = Tool { stand_off: 0.4, footprint: Footprint::Camera(camera), ..sponge };
         assert!(patches(&camera).epsilon > 0.1 && graph(&camera).radius > 0.25);
         assert!(patches(&camera).inlier_distance > 0.02);
     }

@@ -122,9 +122,8 @@ fn visit_seen(
             }
         });
         for (index, place) in &found {
-            let hidden = || {
-                solids.is_some_and(|s| s.hide(&mouth, &scan.points[*index], 2.0 * scan.spacing))
-            };
+            let hidden =
+                || solids.is_some_and(|s| s.hide(&mouth, &scan.points[*index], 2.0 * scan.spacing));
             if view.shows(place) && !hidden() {
                 visit(at, *index);
             }
@@ -158,7 +157,12 @@ pub fn swept_by<'a>(
 
 /// For each point of the scan whether nothing is to be done on it after a motion that is not timed yet,
 /// of a nozzle as if it went at a speed \[m/s\]: where too much was laid more would not help.
-pub(crate) fn done_by(sight: Sight<'_>, motion: Trajectory<'_>, arm: &Arm, speed: f64) -> Vec<bool> {
+pub(crate) fn done_by(
+    sight: Sight<'_>,
+    motion: Trajectory<'_>,
+    arm: &Arm,
+    speed: f64,
+) -> Vec<bool> {
     worked(sight, [motion], arm, Clock::Speed(speed))
 }
 

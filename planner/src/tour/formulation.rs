@@ -191,8 +191,11 @@ impl Problem<'_> {
 
     /// The way of least length and turning.
     fn smoothest(&self, seed: u64) -> Result<Vec<Stop>, FormulationError> {
-        let nodes: Vec<Vec<Stop>> =
-            self.component.iter().map(|&patch| incident_stops(self.graph, patch, self.tool)).collect();
+        let nodes: Vec<Vec<Stop>> = self
+            .component
+            .iter()
+            .map(|&patch| incident_stops(self.graph, patch, self.tool))
+            .collect();
         self.search(&nodes, seed, |a, b| curvature(a, b, self.config.beta, self.tool))
     }
 

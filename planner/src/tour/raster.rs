@@ -142,8 +142,7 @@ impl Face {
         let (low, high) = extent(flat.iter().map(|p| p.v));
         let count = ((high - low) / tool.pitch()).ceil().max(1.0);
         let [_, length] = tool.track();
-        let spacing =
-            if tool.touches() { SPACING } else { SPACING.max(SPACING_SHARE * length) };
+        let spacing = if tool.touches() { SPACING } else { SPACING.max(SPACING_SHARE * length) };
         let band = (high - low) / count;
         let mut strips = Vec::new();
         for k in 0..count as usize {

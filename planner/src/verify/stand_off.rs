@@ -36,11 +36,7 @@ struct Look {
 
 /// The figures, and the first place of each segment where a bound is broken; nothing of a tool that
 /// touches.
-pub(super) fn stand_off(
-    plan: &Plan,
-    arm: &Arm,
-    scan: &Scan,
-) -> (Option<StandOff>, Vec<Violation>) {
+pub(super) fn stand_off(plan: &Plan, arm: &Arm, scan: &Scan) -> (Option<StandOff>, Vec<Violation>) {
     let tool = &plan.tool;
     if tool.touches() || scan.points.is_empty() {
         return (None, Vec::new());

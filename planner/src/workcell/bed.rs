@@ -25,6 +25,9 @@ const TURNS: usize = 8;
 /// A point that lies too aslant stays so much farther from the pad's centre than the nearest one: the arm
 /// follows the line within 0.1 mm. \[m\]
 const GRAZE: f64 = 0.0003;
+/// The same of a tool that works from afar, and how much more it is to face the surface than it must: so
+/// exactly its axis meets what is on the line between two of the arm's joint vectors. \[m\], \[rad\]
+const AFAR: (f64, f64) = (0.005, 0.1);
 /// Least step along a line where such a point is near. \[m\]
 const CREEP: f64 = 0.0001;
 /// The pad is raised and let down no more steeply than this along its way.
@@ -45,6 +48,8 @@ pub struct Bed {
     /// How far before the line that it is led along the pad's centre is; negative: behind; 0 of a tool
     /// that works from afar, which faces what is on the line. \[m\]
     stand_off: f64,
+    /// How much farther a point that lies too aslant stays than the nearest one. \[m\]
+    graze: f64,
 }
 
 impl Bed {
@@ -63,9 +68,10 @@ impl Bed {
         };
         let (surface, radius) = (Surface::new(surface), 0.5 * tool.length.max(tool.width));
         let grid = Grid::new(&points, radius);
-        let facing = tool.reach_angle.cos();
-        let stand_off = if tool.touches() { tool.stand_off } else { 0.0 };
-        Self { surface, points, grid, radius, deepest, highest, facing, stand_off }
+        let (stand_off, graze, spare) =
+            if tool.touches() { (tool.stand_off, GRAZE, 0.0) } else { (0.0, AFAR.0, AFAR.1) };
+        let facing = (tool.reach_angle - spare).max(0.0).cos();
+        Self { surface, points, grid, radius, deepest, highest, facing, stand_off, graze }
     }
 
     /// A surface into which the pad may be pressed as deep as it likes, in any direction.
@@ -73,8 +79,8 @@ impl Bed {
     pub fn soft(surface: Surface) -> Self {
         let (points, grid) = (Vec::new(), Grid::new(&[], 1.0));
         let deepest = f64::INFINITY;
-        let (highest, facing, stand_off) = (0.0, -1.0, 0.0);
-        Self { surface, points, grid, radius: 0.0, deepest, highest, facing, stand_off }
+        let (highest, facing, stand_off, graze) = (0.0, -1.0, 0.0, GRAZE);
+        Self { surface, points, grid, radius: 0.0, deepest, highest, facing, stand_off, graze }
     }
 
     /// The surface as it is.
@@ -192,17 +198,17 @@ impl Bed {
                 let near = self.surface.distance_to(&at, f64::INFINITY, |_| true);
                 // Without a surface there is nothing to face.
                 let near = near.unwrap_or(f64::INFINITY);
-                let reach = near + 2.0 * (length - gone) + GRAZE;
+                let reach = near + 2.0 * (length - gone) + self.graze;
                 let Some(aslant) = self.surface.distance_to(&at, reach, is_aslant) else {
                     return true;
                 };
-                if aslant < near + GRAZE {
+                if aslant < near + self.graze {
                     return false;
                 }
                 if gone >= length {
                     return true;
                 }
-                gone = (gone + (0.5 * (aslant - near - GRAZE)).max(CREEP)).min(length);
+                gone = (gone + (0.5 * (aslant - near - self.graze)).max(CREEP)).min(length);
             }
         })
     }

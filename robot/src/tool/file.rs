@@ -125,7 +125,8 @@ impl ToolFile {
             return Err(ToolError::Foreign { field, shape });
         }
         let need = |field, value: Option<f64>| value.ok_or(ToolError::Missing { field, shape });
-        let pair = |field, value: Option<[f64; 2]>| value.ok_or(ToolError::Missing { field, shape });
+        let pair =
+            |field, value: Option<[f64; 2]>| value.ok_or(ToolError::Missing { field, shape });
         let length = || need("length", self.length);
         let width = || need("width", self.width);
         let radius = || need("radius", self.radius);
@@ -156,7 +157,9 @@ impl ToolFile {
         };
         let is_round = matches!(self.shape, Shape::Disc | Shape::Nozzle);
         let symmetric = match (self.shape, self.symmetric) {
-            (Shape::Rectangle, said) => said.ok_or(ToolError::Missing { field: "symmetric", shape })?,
+            (Shape::Rectangle, said) => {
+                said.ok_or(ToolError::Missing { field: "symmetric", shape })?
+            }
             (_, said) => said.unwrap_or(true),
         };
         let press_max = match self.shape {
