@@ -45,6 +45,8 @@ pub struct Blocked {
 
 /// Most times that a step of the line is halved to stay within [`LINE_TOLERANCE`].
 const MAX_HALVINGS: u32 = 5;
+/// Farthest that what a tool works on from afar is from the line on the surface. \[m\]
+const AFAR_TOLERANCE: f64 = 0.001;
 /// A joint that moves further over one step of the line has changed its branch. \[rad\]
 const MAX_STEP: f64 = 0.8;
 
@@ -172,6 +174,15 @@ impl<'a> Follower<'a> {
         last_up_to(&self.knots, knot)
     }
 
+    /// Whether the pad is where it is to be, and of a tool that works from afar, which a small turn moves
+    /// far on the surface, what it works on.
+    fn is_on_line(&self, pad: &Isometry3<f64>, wanted: &Isometry3<f64>) -> bool {
+        let tool = self.cell.tool;
+        let ahead = Point3::new(0.0, 0.0, tool.stand_off);
+        (pad.translation.vector - wanted.translation.vector).norm() <= LINE_TOLERANCE
+            && (tool.touches() || (pad * ahead - wanted * ahead).norm() <= AFAR_TOLERANCE)
+    }
+
     /// Appends the joint vectors after `a` up to `b`, halving the way while the pad leaves the line
     /// between them.
     fn span(&mut self, a: Place, b: Place, halvings: u32) -> Result<(), TrackFailure> {
@@ -182,7 +193,7 @@ impl<'a> Follower<'a> {
         let share = 0.5 * (a.share + b.share);
         let pose = self.path.between(self.knots.len() - 1, share);
         let pad = self.cell.arm.tip_pose(&middle) * self.contact_in_tip;
-        if (pad.translation.vector - pose.translation.vector).norm() > LINE_TOLERANCE {
+        if !self.is_on_line(&pad, &pose) {
             if halvings == 0 {
                 return Err(TrackFailure::Fold);
             }

@@ -11,39 +11,70 @@ use super::{Tool, ToolError};
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ToolFile {
+    /// For people.
     name: String,
+    /// `rectangle` (a pad; where nothing is said), `disc` (a round pad, its heading free), `roller`
+    /// (rolls along its travel alone), `nozzle` (sprays from afar) or `camera` (looks from afar).
     #[serde(default, skip_serializing_if = "Shape::is_rectangle")]
     shape: Shape,
+    /// Of a rectangle, roller or camera: across the travel, the contact frame's y; of a camera that
+    /// of its body. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     length: Option<f64>,
+    /// Of a rectangle, roller or camera: along the travel, the contact frame's x; of a roller that
+    /// of the strip that touches, of a camera that of its body. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     width: Option<f64>,
+    /// Of a disc; of a roller; of a nozzle's body. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     radius: Option<f64>,
+    /// Of all but a roller: height of the body, from the contact frame's plane back towards the
+    /// arm. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     thickness: Option<f64>,
+    /// The contact frame's origin in the arm's tip frame: the pad's centre, the roller's line of
+    /// contact, the nozzle's mouth, the lens. \[m\]
     centre: [f64; 3],
+    /// The tip frame's axis that points into the surface.
     approach: [f64; 3],
+    /// The tip frame's axis along the long side; a disc and a nozzle need none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     across: Option<[f64; 3]>,
+    /// Distance kept between the contact frame's origin and the surface, along the normal; below 0
+    /// a pad is pressed in so far. \[m\]
     stand_off: f64,
+    /// Of what touches: how far its soft body may be pressed in, along its axis; a third of the
+    /// thickness, or of a roller's radius, where nothing is said. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     press_max: Option<f64>,
+    /// Of a rectangle or roller: whether a heading and its opposite are the same contact; a
+    /// roller's are where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     symmetric: Option<bool>,
+    /// Of what touches: a point is swept within this distance of the plane `stand_off` ahead. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     reach_normal: Option<f64>,
+    /// A point is swept if its normal is within this angle of the pad's, or of the ray to the
+    /// nozzle or camera. \[rad\]
     reach_angle: f64,
+    /// Of a roller: the greatest angle between its travel and its own direction; 0.05 where nothing
+    /// is said. \[rad\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     slip_max: Option<f64>,
+    /// Of a nozzle or camera: nearest and farthest along its axis that it works. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     distance: Option<[f64; 2]>,
+    /// Of a nozzle: half of the opening angle of what it sprays, which falls off from the axis as a
+    /// parabola. \[rad\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     cone: Option<f64>,
+    /// Of a nozzle: what it sprays, of that what stays on. \[m³/s\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rate: Option<f64>,
+    /// Of a nozzle: the least and the most that is to lie on a point in the end. \[m\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     deposit: Option<[f64; 2]>,
+    /// Of a camera: its full opening angles across and along. \[rad\]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     field_of_view: Option<[f64; 2]>,
 }

@@ -61,7 +61,7 @@ fn kind(ty: &Type) -> String {
                 ("Option", [inner]) => kind(inner),
                 ("Vec", [inner]) => format!("list of {}s", kind(inner)),
                 ("BTreeMap", [_, inner]) => format!("table, by name: {}", kind(inner)),
-                ("String", _) => "text".into(),
+                ("String" | "Shape", _) => "text".into(),
                 ("PathBuf", _) => "path".into(),
                 ("f64", _) => "number".into(),
                 ("u8" | "u32", _) => "whole number".into(),

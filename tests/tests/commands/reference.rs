@@ -39,10 +39,11 @@ fn reference() -> String {
         ("Executor", "Table `[executor]`"),
     ];
     text += &tables(&read("robot/cell/src/file.rs"), &cell);
-    text += "## Tool file\n\nA rectangular pad at the tip of the arm, as \
-             [`tools/flange-sponge.toml`](tools/flange-sponge.toml) has it. Every key is needed, but for \
-             `press_max`.\n\n";
-    text += &tables(&read("robot/src/tool.rs"), &[("Tool", "Keys")]);
+    text += "## Tool file\n\nWhat is at the tip of the arm. Every shape has its keys, and no others: see \
+             [`flange-sponge`](tools/flange-sponge.toml), [`finger-pad`](tools/finger-pad.toml), \
+             [`roller`](tools/roller.toml), [`spray-nozzle`](tools/spray-nozzle.toml) and \
+             [`inspection-camera`](tools/inspection-camera.toml).\n\n";
+    text += &tables(&read("robot/src/tool/file.rs"), &[("ToolFile", "Keys")]);
     for program in ["planner", "executor"] {
         for command in session::described(program).below() {
             put(&mut text, &[program.to_owned()], command);
