@@ -1,29 +1,28 @@
 #!/usr/bin/env python3
-"""Writes cup.obj: a cup of 8 cm across and 10 cm high with walls of 4 mm, standing on z = 0."""
+"""Writes cup.obj: a cup of 9 cm across and 11 cm high, put upside down on z = 0."""
 
 from math import cos, pi, sin
 from pathlib import Path
 
 SIDES = 48
-# The outline from the middle of the foot outside and up, over the rim, and down to the middle of the
-# bottom inside: distance from the axis and height. [m]
-OUTLINE = [(0.040, 0.0), (0.040, 0.100), (0.036, 0.100), (0.036, 0.006)]
+# Its outline up to the foot, which is on top: distance from the axis and height. [m]
+OUTLINE = [(0.045, 0.0), (0.043, 0.060), (0.036, 0.110)]
 
 
 def main() -> None:
     rings = [[(r * cos(2 * pi * k / SIDES), r * sin(2 * pi * k / SIDES), z) for k in range(SIDES)]
              for r, z in OUTLINE]
-    points = [point for ring in rings for point in ring] + [(0.0, 0.0, 0.0), (0.0, 0.0, 0.006)]
-    foot, bottom = len(points) - 1, len(points)
+    points = [point for ring in rings for point in ring] + [(0.0, 0.0, 0.0), (0.0, 0.0, OUTLINE[-1][1])]
+    below, above = len(points) - 1, len(points)
     faces = []
     for k in range(SIDES):
         after = (k + 1) % SIDES
         for ring in range(len(rings) - 1):
             a, b = ring * SIDES + k + 1, ring * SIDES + after + 1
             faces.append((a, b, b + SIDES, a + SIDES))
-        faces.append((foot, after + 1, k + 1))
+        faces.append((below, after + 1, k + 1))
         last = (len(rings) - 1) * SIDES + 1
-        faces.append((bottom, last + k, last + after))
+        faces.append((above, last + k, last + after))
     lines = ["# Made by make_cup.py. [m]"]
     lines += ["v " + " ".join(f"{x:.5f}" for x in point) for point in points]
     lines += ["f " + " ".join(map(str, face)) for face in faces]

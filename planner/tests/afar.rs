@@ -4,7 +4,9 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use nullsweep_collision::{MeshPaths, Obstacle, Solids};
 use nullsweep_planner::plan::{PlanKnot, Profile, Trajectory};
 use nullsweep_planner::sweep::{Clock, Missed, Sight, Unswept, coverage, deposits, missed};
-use nullsweep_robot::{Arm, ArmSpec, Camera, Footprint, Geometry, Nozzle, Robot, Side, Tool};
+use nullsweep_robot::{
+    Arm, ArmSpec, Camera, Footprint, Geometry, JointVector, Nozzle, Robot, Side, Tool,
+};
 use nullsweep_surface::Scan;
 
 const SPACING: f64 = 0.005;
@@ -97,8 +99,13 @@ fn sprayed(arm: &Arm, tool: &Tool) -> Scan {
 
 /// The arm at home for so long. \[s\]
 fn hold(arm: &Arm, seconds: f64) -> Vec<PlanKnot> {
-    let knot =
-        |time_ns: u64| PlanKnot { time_ns, line: Some([0.0; 3]), ..PlanKnot::free(arm.home()) };
+    let knot = |time_ns: u64| PlanKnot {
+        time_ns,
+        q: arm.home(),
+        v: JointVector::ZERO,
+        line: Some([0.0; 3]),
+        patch: None,
+    };
     vec![knot(0), knot((1e9 * seconds) as u64)]
 }
 

@@ -110,7 +110,8 @@ mod tests {
         // The tip swings by 0.1 rad, and its way with it.
         assert!(rolled(0.0, true, 0.1).is_empty());
         assert!(rolled(PI, true, 0.1).is_empty(), "backwards");
-        for (turn, symmetric) in [(FRAC_PI_2, true), (0.4, true), (PI, false), (-FRAC_PI_2, false)] {
+        for (turn, symmetric) in [(FRAC_PI_2, true), (0.4, true), (PI, false), (-FRAC_PI_2, false)]
+        {
             let found = rolled(turn, symmetric, 0.1);
             assert_eq!(found.len(), 1, "{turn}");
             assert_eq!((found[0].knot, found[0].kind), (1, ViolationKind::Slip));

@@ -139,11 +139,8 @@ mod tests {
             footprint: Footprint::Camera(camera),
             ..Tool::default()
         };
-        let knot = |time_ns: u64| PlanKnot {
-            time_ns,
-            line: Some([0.0; 3]),
-            ..PlanKnot::free(arm.home())
-        };
+        let knot =
+            |time_ns: u64| PlanKnot { time_ns, line: Some([0.0; 3]), ..PlanKnot::free(arm.home()) };
         let plan = Plan::of(&robot, &arm, &tool, vec![knot(0), knot(1_000_000_000)]);
         let pose = tool.on(&arm).pose(&arm.home());
         let normal = pose * Vector3::new(tilt.sin(), 0.0, -tilt.cos());

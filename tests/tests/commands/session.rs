@@ -41,6 +41,7 @@ impl Session {
         let folder = TempDir::with_prefix("nullsweep-commands-").expect("a folder");
         let (sample, copy) = (root.join("examples/sample"), folder.path().join("examples/sample"));
         copy_all(&sample, &copy);
+        copy_all(&root.join("docs/tools"), &folder.path().join("docs/tools"));
         // Apart from whatever else runs on this machine.
         let cell = copy.join("cell.toml");
         let text = fs::read_to_string(&cell).expect("a cell");
