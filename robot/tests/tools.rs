@@ -28,7 +28,8 @@ fn tool(name: &str) -> Tool {
 fn table(name: &str) -> serde_json::Value {
     let lines = text(name);
     let pairs = lines.lines().filter_map(|line| line.split('#').next()?.split_once('='));
-    let value = |text: &str| serde_json::from_str(text.trim()).expect("a value");
+    let value =
+        |text: &str| serde_json::from_str::<serde_json::Value>(text.trim()).expect("a value");
     pairs.map(|(key, text)| (key.trim().to_owned(), value(text))).collect()
 }
 
