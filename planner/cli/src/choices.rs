@@ -4,6 +4,7 @@ use clap::ValueEnum;
 use nullsweep_planner::link::publish::Join;
 use nullsweep_planner::plan::export::Format;
 use nullsweep_planner::plan::{CostKind, Method, Profile};
+use nullsweep_robot::Tool;
 
 /// An argument's values, and the library's choices that they stand for.
 macro_rules! choices {
@@ -86,6 +87,14 @@ pub enum MethodArg {
 }
 
 impl MethodArg {
+    /// The method that is asked for, or that suits the tool.
+    #[must_use]
+    pub fn suiting(asked: Option<Self>, tool: &Tool) -> Option<Method> {
+        let in_strips = tool.rolls() || tool.own_speed().is_some();
+        let own = if in_strips { Method::Raster } else { Method::Curvature };
+        asked.map_or(Some(own), Self::method)
+    }
+
     /// The method; `None`: the best one.
     #[must_use]
     pub fn method(self) -> Option<Method> {

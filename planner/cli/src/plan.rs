@@ -8,7 +8,7 @@ use clap::Args;
 use nullsweep_collision::Options;
 use nullsweep_planner::link::Site;
 use nullsweep_planner::pipeline::{self, After, End, Job, Outcome, StanceChoice, sizes};
-use nullsweep_planner::plan::{Method, Plan};
+use nullsweep_planner::plan::Plan;
 use nullsweep_planner::progress::Progress;
 use nullsweep_planner::roadmap::GraphConfig;
 use nullsweep_planner::tour::formulation::FormulationConfig;
@@ -414,7 +414,7 @@ fn job(
         },
         after,
         spared: Vec::new(),
-        method: method(args, &tool),
+        method: MethodArg::suiting(args.method, &tool),
         cost: args.cost.into(),
         ik_samples: args.ik_samples as usize,
         v_max: args.v_max,
@@ -441,13 +441,6 @@ fn job(
         seed: args.seed,
         tool,
     })
-}
-
-/// The method that is asked for, or that suits the tool.
-fn method(args: &PlanArgs, tool: &Tool) -> Option<Method> {
-    let in_strips = tool.rolls() || tool.own_speed().is_some();
-    let own = if in_strips { Method::Raster } else { Method::Curvature };
-    args.method.map_or(Some(own), MethodArg::method)
 }
 
 fn held(args: &PlanArgs) -> Vec<(String, f64)> {

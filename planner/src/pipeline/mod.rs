@@ -21,6 +21,7 @@ mod run;
 mod setting;
 pub mod sizes;
 mod start;
+mod stick;
 mod swept;
 
 pub use attempt::Visit;

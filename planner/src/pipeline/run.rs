@@ -13,10 +13,10 @@ use super::error::PipelineError;
 use super::figures::{Figures, figures};
 use super::job::{After, Job};
 use super::left_out::{Known, LeftOut, in_words, left_out, missed_by};
-use super::longer::longer;
 use super::rounds::Course;
 use super::setting::{Setting, settle};
 use super::start::{rest_before, start};
+use super::stick::longer;
 use super::swept::{passed_before, points_of, without_swept};
 use crate::cost;
 use crate::motion::Memo;
@@ -63,10 +63,7 @@ pub fn run(
     job: &Job,
     progress: &dyn Progress,
 ) -> Result<Outcome, PipelineError> {
-    job.after.as_ref().map_or(Ok(()), |after| after.plan.check_bounds())?;
-    if job.tool.own_speed().is_some() && !job.profile.is_curved() {
-        return Err(PipelineError::NoSpeed { tool: job.tool.name.clone() });
-    }
+    check(job)?;
     let mut clock = Clock::default();
     let free_arm = robot.arm(&job.arm)?;
     progress.stage("patches", None);
@@ -89,22 +86,18 @@ pub fn run(
         clock.time("reach", || reach(cell, &patches, job.ik_samples, &|| progress.tick()));
     let mut reachable: Vec<bool> = reached.iter().map(Option::is_some).collect();
     if !reachable.contains(&true) {
-        let none = vec![false; scan.points.len().max(patches.len())];
-        let why = in_words(&left_out(cell, &Known::unreached(scan, &patches, &none)));
-        let (patches, base) = (patches.len(), stance.base);
-        return Err(PipelineError::NothingReached { patches, base, why });
+        return Err(nothing_reached(cell, scan, &patches, stance.base));
     }
     let (found, samples) = (patches.clone(), reached);
     let bed = clock.time("surface", || Bed::new(&here, &job.tool));
     let solids = solids(&here, &job.tool, &job.collision)?;
-    let sight = Sight::of(&here, solids.as_ref());
     let planning = Planning {
         robot,
         job,
         stance: &stance,
         cell,
         scan,
-        sight,
+        sight: Sight::of(&here, solids.as_ref()),
         bed: &bed,
         start,
         velocity: cost::velocities(&arm, job.v_max),
@@ -126,10 +119,8 @@ pub fn run(
     let dropped = &sequence.dropped;
     let known = Known { scan, patches: &found, reachable: &reachable, dropped, swept: &done };
     let floor = Floor { robot, arm: &free_arm, scene, patches: &all, job };
-    let left_out = clock.time("causes", || {
-        let rows = advise(left_out(cell, &known), &others, &floor)?;
-        longer(rows, &stance, &floor)
-    })?;
+    let left_out = clock.time("causes", || advise(left_out(cell, &known), &others, &floor))?;
+    let left_out = clock.time("causes", || longer(left_out, &stance, &floor))?;
     plan.left = left_out.iter().map(LeftOut::told).collect();
     plan.left.extend(course.unwanted(&verification.swept));
     // A stroke leads to a place that has no points of its own.
@@ -145,7 +136,7 @@ pub fn run(
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
-        passes: Passes::of(&passes_over(sight, [plan.trajectory()], &arm)),
+        passes: Passes::of(&passes_over(planning.sight, [plan.trajectory()], &arm)),
         rounds,
         tool_speed: job.tool_speed.map(|speed| Held::of(plan.trajectory(), &arm, speed)),
         verification,
@@ -165,6 +156,27 @@ pub fn run(
         start,
         visits,
     })
+}
+
+/// Whether the job can be planned at all.
+fn check(job: &Job) -> Result<(), PipelineError> {
+    job.after.as_ref().map_or(Ok(()), |after| after.plan.check_bounds())?;
+    if job.tool.own_speed().is_some() && !job.profile.is_curved() {
+        return Err(PipelineError::NoSpeed { tool: job.tool.name.clone() });
+    }
+    Ok(())
+}
+
+/// Why no patch is reached from where the robot stands.
+fn nothing_reached(
+    cell: Workcell<'_>,
+    scan: &Scan,
+    patches: &[Patch],
+    base: [f64; 3],
+) -> PipelineError {
+    let none = vec![false; scan.points.len().max(patches.len())];
+    let why = in_words(&left_out(cell, &Known::unreached(scan, patches, &none)));
+    PipelineError::NothingReached { patches: patches.len(), base, why }
 }
 
 /// The patches of a scene as the pad lies on them, in its frame: what a plan visits.

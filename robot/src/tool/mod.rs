@@ -120,6 +120,7 @@ impl Tool {
     /// # Errors
     /// The first field that is out of its range.
     pub fn check(&self) -> Result<(), ToolError> {
+        self.check_footprint()?;
         let [x, y, z] = self.centre;
         for (field, value, unit, (low, high)) in [
             ("length", self.length, "m", SIDE),
@@ -137,7 +138,6 @@ impl Tool {
                 return Err(ToolError::Range { field, value, unit, low, high });
             }
         }
-        self.check_footprint()?;
         let (approach, across) = (self.approach, self.across);
         let direction = |field, axis: [f64; 3]| {
             Unit::try_new(Vector3::from(axis), 1e-6)

@@ -172,7 +172,7 @@ const PLANNER: &[(&str, &[&str])] = &[
 #[rustfmt::skip]
 const COLLISION: &[&str] = &[
     "frame", "rules", "points", "tree", "mesh", "srdf", "error", "options", "solid",
-    "obstacle", "spheres", "sieve", "field", "bodies", "parts", "figure", "shapes", "pairs", "scene",
+    "obstacle", "spheres", "sieve", "field", "bodies", "parts", "figure", "shapes", "sight", "pairs", "scene",
     "exact", "clearance", "fixed", "moving", "motion", "never", "world", "check", "proof",
 ];
 
