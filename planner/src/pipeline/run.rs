@@ -91,13 +91,14 @@ pub fn run(
     let (found, samples) = (patches.clone(), reached);
     let bed = clock.time("surface", || Bed::new(&here, &job.tool));
     let solids = solids(&here, &job.tool, &job.collision)?;
+    let sight = Sight::of(&here, solids.as_ref());
     let planning = Planning {
         robot,
         job,
         stance: &stance,
         cell,
         scan,
-        sight: Sight::of(&here, solids.as_ref()),
+        sight,
         bed: &bed,
         start,
         velocity: cost::velocities(&arm, job.v_max),
@@ -136,25 +137,24 @@ pub fn run(
         held: stance.held.into_iter().collect(),
         calc_time_total_s: clock.0.values().sum(),
         calc_time_s: clock.0,
-        passes: Passes::of(&passes_over(planning.sight, [plan.trajectory()], &arm)),
+        passes: Passes::of(&passes_over(sight, [plan.trajectory()], &arm)),
         rounds,
         tool_speed: job.tool_speed.map(|speed| Held::of(plan.trajectory(), &arm, speed)),
         verification,
         ..figures(&plan, &arm, &graph, &sequence)
     };
     reachable.resize(patches.len(), true);
-    let (scan, visits) = (here.surface, sequence.visits);
     Ok(Outcome {
         plan,
         figures,
         arm,
-        scan,
+        scan: here.surface,
         patches,
         reached: reachable,
         graph,
         world,
         start,
-        visits,
+        visits: sequence.visits,
     })
 }
 
