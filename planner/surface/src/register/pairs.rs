@@ -130,7 +130,7 @@ impl Fit {
         let limit = 1.4826 * median;
         let limit = match metric {
             Metric::Across => (4.685 * limit).max(1e-4),
-            Metric::Noise => (20.0 * limit).max(0.1),
+            Metric::Noise => (12.0 * limit).max(0.1),
         };
         let (mut matrix, mut right, mut total) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
         for (pair, (way, weights, squared)) in self.pairs.iter().zip(&ways) {
