@@ -9,18 +9,23 @@
 //! does not go, collides, or sweeps too little, the window is narrowed and the piece made again;
 //! without a window it is what it was.
 
+mod band;
+mod bend;
+mod fair;
 mod follow;
 mod piece;
+mod relax;
 mod window;
 
+use nalgebra::Point3;
 use nullsweep_surface::Scan;
 use rayon::prelude::*;
 
-use self::follow::{Station, follow};
+use self::fair::Fair;
 use self::piece::Piece;
-use self::window::Windows;
 use crate::plan::{Plan, PlanKnot};
 use crate::sweep::{contact_motion, coverage};
+use crate::timing::Limits;
 use crate::workcell::{Bed, Workcell};
 
 /// Share of the points to sweep that a fair way may leave out of what the way as it was sweeps.
@@ -28,8 +33,6 @@ const LOSS: f64 = 0.003;
 /// Share of the widest windows down to which they are narrowed first, for the sake of what is swept:
 /// a scan's unevenness is averaged by narrow ones too, and corners are hardly cut.
 const GENTLE: f64 = 0.25;
-/// Rounds of narrowing windows where a piece cannot be followed, and where it sweeps too little.
-const ROUNDS: usize = 40;
 
 /// What is to be swept.
 #[derive(Clone, Copy)]
@@ -42,31 +45,31 @@ pub struct Keep<'a> {
 
 /// The plan (which must be of bang-bang velocity) with fair contact pieces, proven free of
 /// collision; its times are to be set anew. Where a piece cannot be made fair it is as it was.
+/// With `limits` of acceleration the pieces are bent too, so that they take less time.
 #[must_use]
-pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan {
+pub fn fair(
+    plan: &Plan,
+    cell: Workcell<'_>,
+    bed: &Bed,
+    keep: Keep<'_>,
+    limits: Option<&Limits>,
+) -> Plan {
     let mut pieces: Vec<Fair> = Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect();
-    let swept = |plan: &Plan| {
-        coverage::swept(keep.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool)
-    };
-    // Of the points to sweep, and of all.
-    let count = |swept: &[bool]| {
-        let counts = swept.iter().zip(keep.points).filter(|(swept, counts)| **swept && **counts);
-        [counts.count(), swept.iter().filter(|s| **s).count()].map(|count| count as f64)
-    };
-    let before = swept(plan);
-    let whole = count(&vec![true; keep.points.len()]);
-    let least: [f64; 2] = std::array::from_fn(|i| count(&before)[i] - LOSS * whole[i]);
+    let before = keep.swept(plan, cell);
+    let whole = keep.count(&vec![true; keep.points.len()]);
+    let least: [f64; 2] = std::array::from_fn(|i| keep.count(&before)[i] - LOSS * whole[i]);
+    let fits =
+        |swept: &[bool]| keep.count(swept).iter().zip(least).all(|(count, least)| *count >= least);
+    let reach = 0.5 * cell.tool.width.hypot(cell.tool.length);
     let mut narrowest = GENTLE;
-    loop {
-        pieces.par_iter_mut().for_each(|piece| piece.make(cell, bed));
+    let (averaged, kept) = loop {
+        pieces.par_iter_mut().for_each(|piece| piece.average(cell, bed));
         let made = assembled(plan, &pieces);
-        let after = swept(&made);
-        if count(&after).iter().zip(least).all(|(count, least)| *count >= least) {
-            return made;
+        let after = keep.swept(&made, cell);
+        if fits(&after) {
+            break (made, after);
         }
-        let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);
-        let lost: Vec<_> = lost.map(|i| keep.scan.points[i]).collect();
-        let reach = 0.5 * cell.tool.width.hypot(cell.tool.length);
+        let lost = keep.lost(&before, &after);
         let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, reach, narrowest));
         if given.filter(|given| *given).count() == 0 {
             if narrowest == 0.0 {
@@ -75,62 +78,37 @@ pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan 
             }
             narrowest = 0.0;
         }
+    };
+    let Some(limits) = limits else { return averaged };
+    loop {
+        pieces.par_iter_mut().for_each(|piece| piece.relax(cell, bed, limits));
+        let made = assembled(plan, &pieces);
+        let after = keep.swept(&made, cell);
+        if fits(&after) {
+            return made;
+        }
+        let lost = keep.lost(&kept, &after);
+        let given = pieces.iter_mut().map(|fair| fair.give_room_back(&lost, reach));
+        if given.filter(|given| *given).count() == 0 {
+            return averaged;
+        }
     }
 }
 
-/// A piece and what has become of it.
-struct Fair {
-    piece: Piece,
-    windows: Windows,
-    /// `None`: to be made; without stations: as it was.
-    made: Option<Vec<Station>>,
-}
-
-impl Fair {
-    fn new(piece: Piece) -> Self {
-        let windows = Windows::new(piece.length());
-        Self { piece, windows, made: None }
+impl Keep<'_> {
+    fn swept(&self, plan: &Plan, cell: Workcell<'_>) -> Vec<bool> {
+        coverage::swept(self.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool)
     }
 
-    /// Follows the piece, with windows as wide as it goes.
-    fn make(&mut self, cell: Workcell<'_>, bed: &Bed) {
-        if self.made.is_some() {
-            return;
-        }
-        for _ in 0..ROUNDS {
-            match follow(&self.piece, &self.windows, cell, bed) {
-                Ok(stations) => {
-                    self.made = Some(stations);
-                    return;
-                }
-                Err(places) => {
-                    if !self.windows.narrow(&places) {
-                        break;
-                    }
-                }
-            }
-        }
-        self.made = Some(Vec::new());
+    /// Of the points to sweep, and of all.
+    fn count(&self, swept: &[bool]) -> [f64; 2] {
+        let counts = swept.iter().zip(self.points).filter(|(swept, counts)| **swept && **counts);
+        [counts.count(), swept.iter().filter(|s| **s).count()].map(|count| count as f64)
     }
 
-    /// Narrows the pad's windows, down to a share of the widest, wherever the piece as it was came near
-    /// to what is swept no more; whether there was anything to narrow.
-    fn give_back(&mut self, lost: &[nalgebra::Point3<f64>], reach: f64, narrowest: f64) -> bool {
-        let mut places: Vec<f64> =
-            lost.iter().filter_map(|point| self.piece.nearest(point, reach)).collect();
-        places.sort_by(f64::total_cmp);
-        places.dedup_by(|b, a| *b - *a < 0.005);
-        if self.made.as_ref().is_some_and(Vec::is_empty) || places.is_empty() {
-            return false;
-        }
-        if self.windows.narrow_pad(&places, narrowest) {
-            self.made = None;
-        } else if narrowest == 0.0 {
-            self.made = Some(Vec::new());
-        } else {
-            return false;
-        }
-        true
+    fn lost(&self, before: &[bool], after: &[bool]) -> Vec<Point3<f64>> {
+        let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);
+        lost.map(|i| self.scan.points[i]).collect()
     }
 }
 
@@ -138,8 +116,11 @@ impl Fair {
 fn assembled(plan: &Plan, pieces: &[Fair]) -> Plan {
     let mut knots: Vec<PlanKnot> = Vec::with_capacity(plan.knots.len());
     let mut next = 0;
-    for Fair { piece, made, .. } in pieces {
-        let Some(stations) = made.as_ref().filter(|made| !made.is_empty()) else { continue };
+    for fair in pieces {
+        let (piece, stations) = (&fair.piece, fair.stations());
+        if stations.is_empty() {
+            continue;
+        }
         knots.extend(&plan.knots[next..piece.first]);
         knots.extend(stations.iter().map(|s| PlanKnot {
             time_ns: 0,

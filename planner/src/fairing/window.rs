@@ -30,12 +30,15 @@ pub(super) struct Windows {
     pad: Shares,
     /// Of the joints: where the pad goes, and so what it sweeps, does not depend on them.
     joints: Shares,
+    /// Of what the way may be bent aside.
+    bend: Shares,
 }
 
 impl Windows {
     /// The widest, along a piece of some length. \[m\]
     pub(super) fn new(length: f64) -> Self {
-        Self { pad: Shares::new(length), joints: Shares::new(length) }
+        let [pad, joints, bend] = std::array::from_fn(|_| Shares::new(length));
+        Self { pad, joints, bend }
     }
 
     /// At a place of it. At its ends there is none, so that it ends where it did.
@@ -45,6 +48,16 @@ impl Windows {
             heading: self.pad.of(HEADING, u),
             joints: self.joints.of(JOINTS, u),
         }
+    }
+
+    /// The share of the room there is that the way may be bent aside by at a place.
+    pub(super) fn room(&self, u: f64) -> f64 {
+        self.bend.share(u)
+    }
+
+    /// Halves that room around some places; whether any was left to halve.
+    pub(super) fn narrow_room(&mut self, places: &[f64]) -> bool {
+        self.bend.narrow(places, 0.0)
     }
 
     /// Halves the pad's windows around some places, down to `least` of the widest; whether any was left
@@ -78,17 +91,21 @@ impl Shares {
 
     /// The window at a place of which this is the widest. \[m\]
     fn of(&self, width: f64, u: f64) -> f64 {
-        let last = (self.shares.len() - 1) as f64;
-        let place = (u / self.length * last).clamp(0.0, last);
-        let k = (place as usize).min(self.shares.len().saturating_sub(2));
-        let rest = place - k as f64;
-        let share = self.shares[k] * (1.0 - rest) + self.shares[k + 1] * rest;
         let room = 2.0 * u.min(self.length - u).max(0.0);
-        match share * width {
+        match self.share(u) * width {
             0.0 => 0.0,
             _ if room == 0.0 => 0.0,
             wide => wide * room / (wide.powi(4) + room.powi(4)).powf(0.25),
         }
+    }
+
+    /// At a place.
+    fn share(&self, u: f64) -> f64 {
+        let last = (self.shares.len() - 1) as f64;
+        let place = (u / self.length * last).clamp(0.0, last);
+        let k = (place as usize).min(self.shares.len().saturating_sub(2));
+        let rest = place - k as f64;
+        self.shares[k] * (1.0 - rest) + self.shares[k + 1] * rest
     }
 
     fn narrow(&mut self, places: &[f64], least: f64) -> bool {
