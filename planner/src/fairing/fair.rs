@@ -1,9 +1,11 @@
 //! A contact piece and what has become of it.
 
 use nalgebra::Point3;
+use nullsweep_robot::Tool;
 
 use super::bend::Bend;
 use super::follow::{Station, follow};
+use super::guard::{Guard, missed_by};
 use super::piece::Piece;
 use super::relax::Relaxation;
 use super::window::Windows;
@@ -12,6 +14,8 @@ use crate::workcell::{Bed, Workcell};
 
 /// Rounds of narrowing windows, or the room of a bend, where a piece cannot be followed.
 const ROUNDS: usize = 40;
+/// Farther from the pad's centre a point is none of its. \[m\]
+const FAR: f64 = 0.15;
 
 /// A piece and what has become of it.
 pub(super) struct Fair {
@@ -23,12 +27,14 @@ pub(super) struct Fair {
     bend: Bend,
     /// Bent. `None`: to be made; without stations: as it was averaged.
     bent: Option<Vec<Station>>,
+    /// What the pad must come over.
+    guards: Vec<Guard>,
 }
 
 impl Fair {
     pub(super) fn new(piece: Piece) -> Self {
         let (windows, bend) = (Windows::new(piece.length()), Bend::none(piece.length()));
-        Self { piece, windows, averaged: None, bend, bent: None }
+        Self { piece, windows, averaged: None, bend, bent: None, guards: Vec::new() }
     }
 
     /// What takes the piece's place; nothing where it stays as it was.
@@ -68,8 +74,8 @@ impl Fair {
             return;
         }
         for _ in 0..ROUNDS {
-            let Self { piece, windows, .. } = &*self;
-            let relaxation = Relaxation { piece, windows, cell, bed, limits };
+            let Self { piece, windows, guards, .. } = &*self;
+            let relaxation = Relaxation { piece, windows, cell, bed, limits, guards };
             let straight = Bend::none(self.piece.length());
             let relaxed = relaxation.relaxed(self.bend.clone());
             let Some((bend, won)) = relaxed.or_else(|| relaxation.relaxed(straight)) else {
@@ -108,6 +114,21 @@ impl Fair {
             return false;
         }
         true
+    }
+
+    /// By how much the bent piece misses a point, and where it comes nearest to it; `None` where it is
+    /// not bent. \[m\]
+    pub(super) fn miss(&self, point: &Point3<f64>, tool: &Tool) -> Option<(f64, f64)> {
+        let bent = self.bent.as_ref()?.iter();
+        let near = |s: &&Station| (s.pose.translation.vector - point.coords).norm() < FAR;
+        let misses = bent.filter(near).map(|s| (missed_by(point, &s.pose, tool), s.u));
+        misses.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Has the pad come over a point at a place of the piece.
+    pub(super) fn guard(&mut self, point: Point3<f64>, u: f64) {
+        self.guards.push(Guard { u, point });
+        self.bent = None;
     }
 
     /// Narrows the room of the bend in the same way; where there is none left, the piece is bent no more.

@@ -31,7 +31,8 @@ pub(super) struct Station {
     pub(super) pose: Isometry3<f64>,
     /// The patch that is visited there.
     pub(super) patch: Option<u32>,
-    u: f64,
+    /// How far along the piece. \[m\]
+    pub(super) u: f64,
 }
 
 /// Follows the averaged and bent piece, or says where it cannot be.

@@ -13,11 +13,13 @@ mod band;
 mod bend;
 mod fair;
 mod follow;
+mod guard;
 mod piece;
 mod relax;
 mod window;
 
 use nalgebra::Point3;
+use nullsweep_robot::Tool;
 use nullsweep_surface::Scan;
 use rayon::prelude::*;
 
@@ -33,6 +35,8 @@ const LOSS: f64 = 0.003;
 /// Share of the widest windows down to which they are narrowed first, for the sake of what is swept:
 /// a scan's unevenness is averaged by narrow ones too, and corners are hardly cut.
 const GENTLE: f64 = 0.25;
+/// Rounds of having the pad come over points that it would miss, before it is bent less.
+const GUARDED: usize = 12;
 
 /// What is to be swept.
 #[derive(Clone, Copy)]
@@ -54,45 +58,111 @@ pub fn fair(
     keep: Keep<'_>,
     limits: Option<&Limits>,
 ) -> Plan {
-    let mut pieces: Vec<Fair> = Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect();
-    let before = keep.swept(plan, cell);
-    let whole = keep.count(&vec![true; keep.points.len()]);
-    let least: [f64; 2] = std::array::from_fn(|i| keep.count(&before)[i] - LOSS * whole[i]);
-    let fits =
-        |swept: &[bool]| keep.count(swept).iter().zip(least).all(|(count, least)| *count >= least);
-    let reach = 0.5 * cell.tool.width.hypot(cell.tool.length);
-    let mut narrowest = GENTLE;
-    let (averaged, kept) = loop {
-        pieces.par_iter_mut().for_each(|piece| piece.average(cell, bed));
-        let made = assembled(plan, &pieces);
-        let after = keep.swept(&made, cell);
-        if fits(&after) {
-            break (made, after);
-        }
-        let lost = keep.lost(&before, &after);
-        let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, reach, narrowest));
-        if given.filter(|given| *given).count() == 0 {
-            if narrowest == 0.0 {
-                // What is lost is near none of them: who knows why, so all is as it was.
-                return plan.clone();
-            }
-            narrowest = 0.0;
-        }
+    let aim = Aim::new(plan, cell, keep);
+    let pieces = || Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect::<Vec<_>>();
+    let bent = |limits: &Limits, narrowest: f64| {
+        let mut pieces = pieces();
+        // What they sweep too little is for the bends to win back.
+        let _ = aim.averaged(&mut pieces, bed, narrowest);
+        aim.relaxed(&mut pieces, bed, limits)
     };
-    let Some(limits) = limits else { return averaged };
-    loop {
-        pieces.par_iter_mut().for_each(|piece| piece.relax(cell, bed, limits));
-        let made = assembled(plan, &pieces);
-        let after = keep.swept(&made, cell);
-        if fits(&after) {
-            return made;
-        }
-        let lost = keep.lost(&kept, &after);
-        let given = pieces.iter_mut().map(|fair| fair.give_room_back(&lost, reach));
-        if given.filter(|given| *given).count() == 0 {
-            return averaged;
+    limits
+        .and_then(|limits| [GENTLE, 0.0].into_iter().find_map(|least| bent(limits, least)))
+        .or_else(|| aim.averaged(&mut pieces(), bed, 0.0))
+        .unwrap_or_else(|| plan.clone())
+}
+
+/// What is made fair, and what has to be swept.
+struct Aim<'a> {
+    plan: &'a Plan,
+    cell: Workcell<'a>,
+    keep: Keep<'a>,
+    before: Vec<bool>,
+    /// Of the points to sweep, and of all.
+    least: [f64; 2],
+}
+
+impl<'a> Aim<'a> {
+    fn new(plan: &'a Plan, cell: Workcell<'a>, keep: Keep<'a>) -> Self {
+        let before = keep.swept(plan, cell);
+        let (own, whole) = (keep.count(&before), keep.count(&vec![true; keep.points.len()]));
+        let least = std::array::from_fn(|i| own[i] - LOSS * whole[i]);
+        Self { plan, cell, keep, before, least }
+    }
+
+    /// How many points are wanted of those that are swept.
+    fn wanted(&self, swept: &[bool]) -> usize {
+        let counts = self.keep.count(swept);
+        (0..2).map(|i| (self.least[i] - counts[i]).max(0.0).ceil() as usize).sum()
+    }
+
+    /// How far from the pad's centre it sweeps. \[m\]
+    fn reach(&self) -> f64 {
+        0.5 * self.cell.tool.width.hypot(self.cell.tool.length)
+    }
+
+    /// With averaged pieces, the pad's windows narrowed for what is swept down to a share of the widest;
+    /// `None` where too little is swept even so.
+    fn averaged(&self, pieces: &mut [Fair], bed: &Bed, narrowest: f64) -> Option<Plan> {
+        let mut least = narrowest.max(GENTLE);
+        loop {
+            pieces.par_iter_mut().for_each(|piece| piece.average(self.cell, bed));
+            let made = assembled(self.plan, pieces);
+            let after = self.keep.swept(&made, self.cell);
+            if self.wanted(&after) == 0 {
+                return Some(made);
+            }
+            let lost = self.keep.lost(&self.before, &after);
+            let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, self.reach(), least));
+            if given.filter(|given| *given).count() == 0 {
+                if least <= narrowest {
+                    // What is lost is near none of them, or they are not to be narrowed any more.
+                    return None;
+                }
+                least = narrowest;
+            }
         }
     }
+
+    /// With averaged pieces that are bent so as to take less time; `None` where too little is swept even
+    /// so.
+    fn relaxed(&self, pieces: &mut [Fair], bed: &Bed, limits: &Limits) -> Option<Plan> {
+        for round in 0.. {
+            pieces.par_iter_mut().for_each(|piece| piece.relax(self.cell, bed, limits));
+            let made = assembled(self.plan, pieces);
+            let after = self.keep.swept(&made, self.cell);
+            let wanted = self.wanted(&after);
+            if wanted == 0 {
+                return Some(made);
+            }
+            let lost = self.keep.lost(&self.before, &after);
+            if round < GUARDED && guard(pieces, &lost, wanted, self.cell.tool) {
+                continue;
+            }
+            let given = pieces.iter_mut().map(|fair| fair.give_room_back(&lost, self.reach()));
+            if given.filter(|given| *given).count() == 0 {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// Has the pieces come over some more of the points that are lost, those first that are missed by least;
+/// whether there are any.
+fn guard(pieces: &mut [Fair], lost: &[Point3<f64>], wanted: usize, tool: &Tool) -> bool {
+    let nearest = |point: &Point3<f64>| {
+        let misses = pieces.iter().enumerate().filter_map(|(k, f)| Some((k, f.miss(point, tool)?)));
+        let least = misses.min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        least.map(|(piece, (miss, u))| (miss, piece, u, *point))
+    };
+    let mut all: Vec<_> = lost.par_iter().filter_map(nearest).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.truncate(wanted + wanted / 2 + 1);
+    for &(_, piece, u, point) in &all {
+        pieces[piece].guard(point, u);
+    }
+    !all.is_empty()
 }
 
 impl Keep<'_> {

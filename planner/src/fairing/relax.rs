@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::band::Band;
 use super::bend::{Bend, Offset};
 use super::follow::onto;
+use super::guard::Guard;
 use super::piece::{Laid, Mean, Piece};
 use super::window::Windows;
 use crate::timing::{Limits, arrivals};
@@ -23,14 +24,14 @@ use crate::workcell::{Bed, Workcell};
 /// What the pad may be off its averaged way: beside it on the surface \[m\], turned about its axis,
 /// tilted \[rad\]. Where it is as much, that costs [`PRICE`].
 const BESIDE: f64 = 0.012;
-const TURNED: f64 = 0.25;
+const TURNED: f64 = 1.0;
 const TILTED: f64 = 0.06;
 /// Off the surface: it is laid onto it again. \[m\]
 const OFF: f64 = 0.0005;
 /// The joints off their average, where they are to stay near it. \[rad\] or \[m\]
 const ASIDE: f64 = 0.2;
 /// Time that a deviation may cost along the way. \[s/m\]
-const PRICE: f64 = 1.0;
+const PRICE: f64 = 0.3;
 /// Power to which shares of limits count.
 const POWER: f64 = 6.0;
 /// Most steps, and halvings of one.
@@ -44,6 +45,8 @@ const WORTH: f64 = 5e-4;
 const MARGIN: f64 = 0.01;
 /// Weight of what passes that. \[s/rad²\]
 const BARRIER: f64 = 1e3;
+/// Weight of what the pad is to come over and misses. \[s/m²\]
+const MISSED: f64 = 1e5;
 /// Less room than this is none.
 const LEAST_ROOM: f64 = 0.05;
 
@@ -54,6 +57,8 @@ pub(super) struct Relaxation<'a> {
     pub(super) cell: Workcell<'a>,
     pub(super) bed: &'a Bed,
     pub(super) limits: &'a Limits,
+    /// What the pad must come over.
+    pub(super) guards: &'a [Guard],
 }
 
 /// A bent piece as it is gone along.
@@ -123,7 +128,13 @@ impl Relaxation<'_> {
         }
         let times = arrivals(&q, self.limits);
         let costs: f64 = (0..bend.controls.len()).map(|k| self.deviation(&bend, k)).sum();
-        let merit = times.last()? + costs;
+        let pad = self.cell.tool.on(self.cell.arm);
+        let short = |guard: &Guard| {
+            let pose = pad.pose(&q[self.node(guard.u)]);
+            guard.short(&pose, self.cell.tool).norm_squared()
+        };
+        let missed: f64 = self.guards.iter().map(short).sum();
+        let merit = times.last()? + costs + MISSED * missed;
         merit.is_finite().then_some(Way { bend, q, times, merit })
     }
 
@@ -195,6 +206,7 @@ impl Relaxation<'_> {
                 }
             }
         }
+        self.add_guards(way, &jacobians, &mut matrix, &mut right);
         matrix.solve(&mut right);
         let most = right.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let scale = (FARTHEST / most).min(1.0);
@@ -270,9 +282,51 @@ impl Relaxation<'_> {
     }
 
     fn nearest(&self, bend: &Bend, control: usize) -> usize {
+        self.node(bend.middle(control))
+    }
+
+    /// The node nearest to a place.
+    fn node(&self, u: f64) -> usize {
         let last = self.piece.steps();
-        let place = bend.middle(control) / self.piece.length() * last as f64;
-        (place.round() as usize).min(last)
+        ((u / self.piece.length() * last as f64).round() as usize).min(last)
+    }
+
+    /// Adds what it costs that the pad does not come over what it must.
+    fn add_guards(&self, way: &Way, jacobians: &[Jacobian], matrix: &mut Band, right: &mut [f64]) {
+        let dof = self.cell.arm.limits().len();
+        let pad = self.cell.tool.on(self.cell.arm);
+        for guard in self.guards {
+            let pose = pad.pose(&way.q[self.node(guard.u)]);
+            let short = guard.short(&pose, self.cell.tool);
+            for axis in 0..2 {
+                if short[axis] == 0.0 {
+                    continue;
+                }
+                let direction = pose.rotation * Vector3::ith(axis, 1.0);
+                let slope = |control: usize, weight: f64| -> Vec<f64> {
+                    let jacobian = &jacobians[control];
+                    let along = |j: usize| jacobian.fixed_view::<3, 1>(0, j).dot(&direction);
+                    (0..dof).map(|j| weight * along(j)).collect()
+                };
+                let slopes: Vec<(usize, Vec<f64>)> =
+                    way.bend.weights(guard.u).map(|(c, weight)| (c, slope(c, weight))).collect();
+                for (at, (control, own)) in slopes.iter().enumerate() {
+                    for j in 0..dof {
+                        let row = control * dof + j;
+                        let pull = MISSED * own[j];
+                        right[row] += pull * short[axis];
+                        for (other, theirs) in &slopes[at..] {
+                            for (i, slope) in theirs.iter().enumerate() {
+                                let column = other * dof + i;
+                                if column >= row {
+                                    matrix.add(row, column, pull * slope);
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// Of the pad's centre at a control.

@@ -6,10 +6,13 @@ const GRID: f64 = 0.002;
 const PLACE: f64 = 0.2;
 const HEADING: f64 = 0.4;
 const JOINTS: f64 = 0.4;
-/// Steepest change of a window's share along the way. \[1/m\]
+/// Steepest change along the way of a window's share, and of a bend's room. \[1/m\]
 const STEEPEST: f64 = 8.0;
+const STEEPEST_ROOM: f64 = 25.0;
 /// Half of the length over which changes of the share are rounded. \[m\]
 const ROUNDED: f64 = 0.02;
+/// How many times that length it is looked farther for room to narrow.
+const AROUND: i32 = 12;
 /// A window that would be narrower than this share is none.
 const NARROWEST: f64 = 0.05;
 
@@ -37,8 +40,8 @@ pub(super) struct Windows {
 impl Windows {
     /// The widest, along a piece of some length. \[m\]
     pub(super) fn new(length: f64) -> Self {
-        let [pad, joints, bend] = std::array::from_fn(|_| Shares::new(length));
-        Self { pad, joints, bend }
+        let [pad, joints] = std::array::from_fn(|_| Shares::new(length, STEEPEST));
+        Self { pad, joints, bend: Shares::new(length, STEEPEST_ROOM) }
     }
 
     /// At a place of it. At its ends there is none, so that it ends where it did.
@@ -55,9 +58,16 @@ impl Windows {
         self.bend.share(u)
     }
 
-    /// Halves that room around some places; whether any was left to halve.
+    /// Halves that room around some places, where none is left a little farther around them; whether any
+    /// was left to halve.
     pub(super) fn narrow_room(&mut self, places: &[f64]) -> bool {
-        self.bend.narrow(places, 0.0)
+        (0..=AROUND).any(|k| {
+            let aside = f64::from(k) * ROUNDED;
+            let around = places.iter().flat_map(|u| [(u - aside).max(0.0), u + aside]);
+            let mut around: Vec<f64> = around.collect();
+            around.sort_by(f64::total_cmp);
+            self.bend.narrow(&around, 0.0)
+        })
     }
 
     /// Halves the pad's windows around some places, down to `least` of the widest; whether any was left
@@ -76,6 +86,8 @@ impl Windows {
 /// Shares of the widest window along a piece.
 struct Shares {
     length: f64,
+    /// Their steepest change. \[1/m\]
+    steepest: f64,
     /// As asked for.
     asked: Vec<f64>,
     /// Rounded.
@@ -83,10 +95,10 @@ struct Shares {
 }
 
 impl Shares {
-    fn new(length: f64) -> Self {
+    fn new(length: f64, steepest: f64) -> Self {
         let count = (length / GRID).ceil().max(1.0) as usize + 1;
         let whole = vec![1.0; count];
-        Self { length, asked: whole.clone(), shares: whole }
+        Self { length, steepest, asked: whole.clone(), shares: whole }
     }
 
     /// The window at a place of which this is the widest. \[m\]
@@ -122,7 +134,7 @@ impl Shares {
             let half = if 0.5 * share < NARROWEST { 0.0 } else { 0.5 * share };
             self.asked[k] = half.max(least).min(share);
         }
-        let step = STEEPEST * spacing;
+        let step = self.steepest * spacing;
         for k in 1..count {
             self.asked[k] = self.asked[k].min(self.asked[k - 1] + step);
         }
