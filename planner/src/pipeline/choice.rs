@@ -149,7 +149,8 @@ fn moved(of: &Planning<'_>, mut plan: Plan, rest: Option<&Rest>, clock: &mut Clo
     if job.smooth {
         progress.stage("fairing", None);
         let keep = Keep { scan: of.scan, points: of.to_sweep };
-        plan = clock.time("fairing", || fair(&plan, cell, of.bed, keep));
+        let limits = job.profile.is_curved().then(|| Limits::of(cell.arm, job.v_max));
+        plan = clock.time("fairing", || fair(&plan, cell, of.bed, keep, limits.as_ref()));
         timing::set_times(&mut plan.knots, &of.velocity);
     }
     if job.profile.is_curved() {
