@@ -9,7 +9,7 @@ use nullsweep_surface::{Patch, Scan, SurfacePoint};
 use rayon::prelude::*;
 
 use crate::progress::Progress;
-use crate::sweep::coverage;
+use crate::sweep::visit_swept;
 use crate::workcell::{Bed, Workcell, contact_pose, direction, middle_out, redundancies};
 
 /// Side of the cubes in each of which the pad is tried on one point of the surface. \[m\]
@@ -49,7 +49,7 @@ pub fn coverable(
         let poses = poses(cell, bed, foot);
         let contacts: Vec<Isometry3<f64>> = poses.iter().map(|(pose, _)| *pose).collect();
         let mut under = vec![Vec::new(); poses.len()];
-        coverage::visit_swept(scan, &contacts, cell.tool, |pose, point| under[pose].push(point));
+        visit_swept(scan, &contacts, cell.tool, |pose, point| under[pose].push(point));
         // Whichever thread comes first: what is covered in the end is the same.
         for ((pose, heading), under) in poses.iter().zip(under) {
             let is_new = under.iter().any(|&point| !covered[point].load(Relaxed));

@@ -1,10 +1,11 @@
-//! The joints along an averaged piece.
+//! The joints along an averaged and bent piece.
 
 use nalgebra::Isometry3;
 use nullsweep_collision::ToolContact;
 use nullsweep_robot::{JointVector, MAX_DOF, damped_step, pose_error};
 use rayon::prelude::*;
 
+use super::bend::Bend;
 use super::piece::{Laid, Piece};
 use super::window::Windows;
 use crate::plan::LINE_TOLERANCE;
@@ -22,7 +23,7 @@ const THERE: f64 = 1e-9;
 /// Damping of these steps.
 const DAMPING: f64 = 1e-8;
 
-/// A place of the averaged way that the arm is at.
+/// A place of the way that the arm is at.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Station {
     pub(super) q: JointVector,
@@ -30,17 +31,19 @@ pub(super) struct Station {
     pub(super) pose: Isometry3<f64>,
     /// The patch that is visited there.
     pub(super) patch: Option<u32>,
-    u: f64,
+    /// How far along the piece. \[m\]
+    pub(super) u: f64,
 }
 
-/// Follows the averaged piece, or says where it cannot be.
+/// Follows the averaged and bent piece, or says where it cannot be.
 pub(super) fn follow(
     piece: &Piece,
     windows: &Windows,
+    bend: &Bend,
     cell: Workcell<'_>,
     bed: &Bed,
 ) -> Result<Vec<Station>, Vec<f64>> {
-    let way = Way { piece, windows, cell, laid: piece.laid(bed, |u| windows.at(u)) };
+    let way = Way { piece, windows, bend, cell, laid: piece.laid(bed, windows, bend) };
     let found: Vec<Result<Station, f64>> =
         places(piece).into_par_iter().map(|(u, patch)| way.at(u, patch).ok_or(u)).collect();
     let failed: Vec<f64> = found.iter().filter_map(|f| f.as_ref().err().copied()).collect();
@@ -90,6 +93,7 @@ fn places(piece: &Piece) -> Vec<(f64, Option<u32>)> {
 struct Way<'a> {
     piece: &'a Piece,
     windows: &'a Windows,
+    bend: &'a Bend,
     cell: Workcell<'a>,
     laid: Laid,
 }
@@ -97,26 +101,10 @@ struct Way<'a> {
 impl Way<'_> {
     fn at(&self, u: f64, patch: Option<u32>) -> Option<Station> {
         let window = self.windows.at(u);
-        let mean = self.piece.mean(u, window);
+        let mean = self.piece.mean(u, window).moved(&self.bend.at(u));
         let pose = mean.pose(self.laid.at(u, window))?;
-        let q = self.onto(&pose, mean.q)?;
+        let q = onto(self.cell, &pose, mean.q)?;
         self.cell.arm.within_margins(&q).then_some(Station { q, pose, patch, u })
-    }
-
-    /// The joint vector nearest to one near by that brings the pad onto a pose.
-    fn onto(&self, pose: &Isometry3<f64>, near: JointVector) -> Option<JointVector> {
-        let arm = self.cell.arm;
-        let tip = pose * self.cell.tool.contact_in_tip().inverse();
-        let mut q = near;
-        for _ in 0..STEPS {
-            let (now, jacobian) = arm.tip_pose_and_jacobian(&q);
-            let error = pose_error(&now, &tip);
-            if error.norm() < THERE {
-                return Some(q);
-            }
-            q = q + damped_step(&jacobian, &error, DAMPING)?;
-        }
-        None
     }
 
     /// The stations after `a` up to `b`, the pad within the line's tolerance between them.
@@ -134,4 +122,23 @@ impl Way<'_> {
         stations.extend(self.between(&middle, b, halvings)?);
         Some(stations)
     }
+}
+
+/// The joint vector nearest to one near by that brings the pad onto a pose.
+pub(super) fn onto(
+    cell: Workcell<'_>,
+    pose: &Isometry3<f64>,
+    near: JointVector,
+) -> Option<JointVector> {
+    let tip = pose * cell.tool.contact_in_tip().inverse();
+    let mut q = near;
+    for _ in 0..STEPS {
+        let (now, jacobian) = cell.arm.tip_pose_and_jacobian(&q);
+        let error = pose_error(&now, &tip);
+        if error.norm() < THERE {
+            return Some(q);
+        }
+        q = q + damped_step(&jacobian, &error, DAMPING)?;
+    }
+    None
 }

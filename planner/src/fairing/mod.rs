@@ -9,17 +9,24 @@
 //! does not go, collides, or sweeps too little, the window is narrowed and the piece made again;
 //! without a window it is what it was.
 
+mod band;
+mod bend;
+mod fair;
 mod follow;
+mod guard;
 mod piece;
+mod relax;
 mod window;
 
+use nalgebra::Point3;
+use nullsweep_robot::Tool;
 use rayon::prelude::*;
 
-use self::follow::{Station, follow};
+use self::fair::Fair;
 use self::piece::Piece;
-use self::window::Windows;
 use crate::plan::{Plan, PlanKnot};
 use crate::sweep::{Sight, coverage};
+use crate::timing::Limits;
 use crate::workcell::{Bed, Workcell};
 
 /// Share of the points to sweep that a fair way may leave out of what the way as it was sweeps.
@@ -27,8 +34,8 @@ const LOSS: f64 = 0.003;
 /// Share of the widest windows down to which they are narrowed first, for the sake of what is swept:
 /// a scan's unevenness is averaged by narrow ones too, and corners are hardly cut.
 const GENTLE: f64 = 0.25;
-/// Rounds of narrowing windows where a piece cannot be followed, and where it sweeps too little.
-const ROUNDS: usize = 40;
+/// Rounds of having the pad come over points that it would miss, before it is bent less.
+const GUARDED: usize = 12;
 
 /// What is to be swept.
 #[derive(Clone, Copy)]
@@ -43,94 +50,136 @@ pub struct Keep<'a> {
 
 /// The plan (which must be of bang-bang velocity) with fair contact pieces, proven free of
 /// collision; its times are to be set anew. Where a piece cannot be made fair it is as it was.
+/// With `limits` of acceleration the pieces are bent too, so that they take less time.
 #[must_use]
-pub fn fair(plan: &Plan, cell: Workcell<'_>, bed: &Bed, keep: Keep<'_>) -> Plan {
-    let mut pieces: Vec<Fair> = Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect();
-    let swept =
-        |plan: &Plan| coverage::done_by(keep.sight, plan.trajectory(), cell.arm, keep.speed);
-    // Of the points to sweep, and of all.
-    let count = |swept: &[bool]| {
-        let counts = swept.iter().zip(keep.points).filter(|(swept, counts)| **swept && **counts);
-        [counts.count(), swept.iter().filter(|s| **s).count()].map(|count| count as f64)
+pub fn fair(
+    plan: &Plan,
+    cell: Workcell<'_>,
+    bed: &Bed,
+    keep: Keep<'_>,
+    limits: Option<&Limits>,
+) -> Plan {
+    let aim = Aim::new(plan, cell, keep);
+    let pieces = || Piece::all(plan, cell, bed).into_iter().map(Fair::new).collect::<Vec<_>>();
+    let bent = |limits: &Limits, narrowest: f64| {
+        let mut pieces = pieces();
+        // What they sweep too little is for the bends to win back.
+        let _ = aim.averaged(&mut pieces, bed, narrowest);
+        aim.relaxed(&mut pieces, bed, limits)
     };
-    let before = swept(plan);
-    let whole = count(&vec![true; keep.points.len()]);
-    let least: [f64; 2] = std::array::from_fn(|i| count(&before)[i] - LOSS * whole[i]);
-    let mut narrowest = GENTLE;
-    loop {
-        pieces.par_iter_mut().for_each(|piece| piece.make(cell, bed));
-        let made = assembled(plan, &pieces);
-        let after = swept(&made);
-        if count(&after).iter().zip(least).all(|(count, least)| *count >= least) {
-            return made;
+    limits
+        .and_then(|limits| [GENTLE, 0.0].into_iter().find_map(|least| bent(limits, least)))
+        .or_else(|| aim.averaged(&mut pieces(), bed, 0.0))
+        .unwrap_or_else(|| plan.clone())
+}
+
+/// What is made fair, and what has to be swept.
+struct Aim<'a> {
+    plan: &'a Plan,
+    cell: Workcell<'a>,
+    keep: Keep<'a>,
+    before: Vec<bool>,
+    /// Of the points to sweep, and of all.
+    least: [f64; 2],
+}
+
+impl<'a> Aim<'a> {
+    fn new(plan: &'a Plan, cell: Workcell<'a>, keep: Keep<'a>) -> Self {
+        let before = keep.swept(plan, cell);
+        let (own, whole) = (keep.count(&before), keep.count(&vec![true; keep.points.len()]));
+        let least = std::array::from_fn(|i| own[i] - LOSS * whole[i]);
+        Self { plan, cell, keep, before, least }
+    }
+
+    /// How many points are wanted of those that are swept.
+    fn wanted(&self, swept: &[bool]) -> usize {
+        let counts = self.keep.count(swept);
+        (0..2).map(|i| (self.least[i] - counts[i]).max(0.0).ceil() as usize).sum()
+    }
+
+    /// How far from the pad's centre it sweeps. \[m\]
+    fn reach(&self) -> f64 {
+        self.cell.tool.outer_radius()
+    }
+
+    /// With averaged pieces, the pad's windows narrowed for what is swept down to a share of the widest;
+    /// `None` where too little is swept even so.
+    fn averaged(&self, pieces: &mut [Fair], bed: &Bed, narrowest: f64) -> Option<Plan> {
+        let mut least = narrowest.max(GENTLE);
+        loop {
+            pieces.par_iter_mut().for_each(|piece| piece.average(self.cell, bed));
+            let made = assembled(self.plan, pieces);
+            let after = self.keep.swept(&made, self.cell);
+            if self.wanted(&after) == 0 {
+                return Some(made);
+            }
+            let lost = self.keep.lost(&self.before, &after);
+            let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, self.reach(), least));
+            if given.filter(|given| *given).count() == 0 {
+                if least <= narrowest {
+                    // What is lost is near none of them, or they are not to be narrowed any more.
+                    return None;
+                }
+                least = narrowest;
+            }
         }
+    }
+
+    /// With averaged pieces that are bent so as to take less time; `None` where too little is swept even
+    /// so.
+    fn relaxed(&self, pieces: &mut [Fair], bed: &Bed, limits: &Limits) -> Option<Plan> {
+        for round in 0.. {
+            pieces.par_iter_mut().for_each(|piece| piece.relax(self.cell, bed, limits));
+            let made = assembled(self.plan, pieces);
+            let after = self.keep.swept(&made, self.cell);
+            let wanted = self.wanted(&after);
+            if wanted == 0 {
+                return Some(made);
+            }
+            let lost = self.keep.lost(&self.before, &after);
+            if round < GUARDED && guard(pieces, &lost, wanted, self.cell.tool) {
+                continue;
+            }
+            let given = pieces.iter_mut().map(|fair| fair.give_room_back(&lost, self.reach()));
+            if given.filter(|given| *given).count() == 0 {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// Has the pieces come over some more of the points that are lost, those first that are missed by least;
+/// whether there are any.
+fn guard(pieces: &mut [Fair], lost: &[Point3<f64>], wanted: usize, tool: &Tool) -> bool {
+    let nearest = |point: &Point3<f64>| {
+        let misses = pieces.iter().enumerate().filter_map(|(k, f)| Some((k, f.miss(point, tool)?)));
+        let least = misses.min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        least.map(|(piece, (miss, u))| (miss, piece, u, *point))
+    };
+    let mut all: Vec<_> = lost.par_iter().filter_map(nearest).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.truncate(wanted + wanted / 2 + 1);
+    for &(_, piece, u, point) in &all {
+        pieces[piece].guard(point, u);
+    }
+    !all.is_empty()
+}
+
+impl Keep<'_> {
+    fn swept(&self, plan: &Plan, cell: Workcell<'_>) -> Vec<bool> {
+        coverage::done_by(self.sight, plan.trajectory(), cell.arm, self.speed)
+    }
+
+    /// Of the points to sweep, and of all.
+    fn count(&self, swept: &[bool]) -> [f64; 2] {
+        let counts = swept.iter().zip(self.points).filter(|(swept, counts)| **swept && **counts);
+        [counts.count(), swept.iter().filter(|s| **s).count()].map(|count| count as f64)
+    }
+
+    fn lost(&self, before: &[bool], after: &[bool]) -> Vec<Point3<f64>> {
         let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);
-        let lost: Vec<_> = lost.map(|i| keep.sight.scan.points[i]).collect();
-        let reach = cell.tool.outer_radius();
-        let given = pieces.iter_mut().map(|fair| fair.give_back(&lost, reach, narrowest));
-        if given.filter(|given| *given).count() == 0 {
-            if narrowest == 0.0 {
-                // What is lost is near none of them: who knows why, so all is as it was.
-                return plan.clone();
-            }
-            narrowest = 0.0;
-        }
-    }
-}
-
-/// A piece and what has become of it.
-struct Fair {
-    piece: Piece,
-    windows: Windows,
-    /// `None`: to be made; without stations: as it was.
-    made: Option<Vec<Station>>,
-}
-
-impl Fair {
-    fn new(piece: Piece) -> Self {
-        let windows = Windows::new(piece.length());
-        Self { piece, windows, made: None }
-    }
-
-    /// Follows the piece, with windows as wide as it goes.
-    fn make(&mut self, cell: Workcell<'_>, bed: &Bed) {
-        if self.made.is_some() {
-            return;
-        }
-        for _ in 0..ROUNDS {
-            match follow(&self.piece, &self.windows, cell, bed) {
-                Ok(stations) => {
-                    self.made = Some(stations);
-                    return;
-                }
-                Err(places) => {
-                    if !self.windows.narrow(&places) {
-                        break;
-                    }
-                }
-            }
-        }
-        self.made = Some(Vec::new());
-    }
-
-    /// Narrows the pad's windows, down to a share of the widest, wherever the piece as it was came near
-    /// to what is swept no more; whether there was anything to narrow.
-    fn give_back(&mut self, lost: &[nalgebra::Point3<f64>], reach: f64, narrowest: f64) -> bool {
-        let mut places: Vec<f64> =
-            lost.iter().filter_map(|point| self.piece.nearest(point, reach)).collect();
-        places.sort_by(f64::total_cmp);
-        places.dedup_by(|b, a| *b - *a < 0.005);
-        if self.made.as_ref().is_some_and(Vec::is_empty) || places.is_empty() {
-            return false;
-        }
-        if self.windows.narrow_pad(&places, narrowest) {
-            self.made = None;
-        } else if narrowest == 0.0 {
-            self.made = Some(Vec::new());
-        } else {
-            return false;
-        }
-        true
+        lost.map(|i| self.sight.scan.points[i]).collect()
     }
 }
 
@@ -138,8 +187,11 @@ impl Fair {
 fn assembled(plan: &Plan, pieces: &[Fair]) -> Plan {
     let mut knots: Vec<PlanKnot> = Vec::with_capacity(plan.knots.len());
     let mut next = 0;
-    for Fair { piece, made, .. } in pieces {
-        let Some(stations) = made.as_ref().filter(|made| !made.is_empty()) else { continue };
+    for fair in pieces {
+        let (piece, stations) = (&fair.piece, fair.stations());
+        if stations.is_empty() {
+            continue;
+        }
         knots.extend(&plan.knots[next..piece.first]);
         knots.extend(stations.iter().map(|s| PlanKnot {
             time_ns: 0,

@@ -2,8 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use nullsweep_robot::JointVector;
+use rayon::prelude::*;
 
-use super::window::Window;
+use super::bend::{Bend, Offset};
+use super::window::{Window, Windows};
 use crate::plan::Plan;
 use crate::workcell::{Bed, Workcell};
 
@@ -86,9 +88,27 @@ impl Mean {
         Some(Isometry3::from_parts(centre.into(), UnitQuaternion::from_rotation_matrix(&rotation)))
     }
 
+    /// Bent aside.
+    pub(super) fn moved(&self, by: &Offset) -> Self {
+        let shift: Vector3<f64> = by.twist.fixed_rows::<3>(0).into();
+        let turn = UnitQuaternion::from_scaled_axis(by.twist.fixed_rows::<3>(3));
+        Self {
+            q: self.q + by.q,
+            centre: self.centre + shift,
+            travel: turn * self.travel,
+            into: turn * self.into,
+            rise: self.rise,
+        }
+    }
+
+    /// The pad's axis; zero where it turns too much to have a mean.
+    pub(super) fn axis(&self) -> Vector3<f64> {
+        self.into.try_normalize(SHORTEST).unwrap_or_default()
+    }
+
     /// How far along its axis the pad has to go to be off the surface by as much as it was; `None`
     /// over a hole.
-    fn laid(&self, bed: &Bed) -> Option<f64> {
+    pub(super) fn laid(&self, bed: &Bed) -> Option<f64> {
         let into = self.into.try_normalize(SHORTEST)?;
         let normal = nalgebra::UnitVector3::new_normalize(-into);
         let centre = Point3::from(self.centre);
@@ -177,12 +197,20 @@ impl Piece {
         Mean { q, centre, travel, into, rise }
     }
 
-    /// How far the averaged way has to be shifted along the pad's axis at places [`LAID`] apart.
-    pub(super) fn laid(&self, bed: &Bed, window: impl Fn(f64) -> Window) -> Laid {
-        let count = (self.length / LAID).ceil().max(1.0) as usize;
-        let at = |k: usize| self.length * k as f64 / count as f64;
-        let shift = |k: usize| self.mean(at(k), window(at(k))).laid(bed).unwrap_or(0.0);
-        Laid { length: self.length, shifts: (0..=count).map(shift).collect() }
+    /// How many steps there are between the places at which it is laid onto the surface, [`LAID`] apart
+    /// at most.
+    pub(super) fn steps(&self) -> usize {
+        (self.length / LAID).ceil().max(1.0) as usize
+    }
+
+    /// How far the averaged and bent way has to be shifted along the pad's axis.
+    pub(super) fn laid(&self, bed: &Bed, windows: &Windows, bend: &Bend) -> Laid {
+        let count = self.steps();
+        let shift = |k: usize| {
+            let u = self.length * k as f64 / count as f64;
+            self.mean(u, windows.at(u)).moved(&bend.at(u)).laid(bed).unwrap_or(0.0)
+        };
+        Laid::new(self.length, (0..=count).into_par_iter().map(shift).collect())
     }
 
     fn averaged(&self, u: f64, width: f64) -> State {
@@ -212,6 +240,11 @@ pub(super) struct Laid {
 }
 
 impl Laid {
+    /// By the shifts at even distances along a piece of some length. \[m\]
+    pub(super) fn new(length: f64, shifts: Vec<f64>) -> Self {
+        Self { length, shifts }
+    }
+
     /// Averaged over as much as the way itself. \[m\]
     pub(super) fn at(&self, u: f64, window: Window) -> f64 {
         let last = (self.shifts.len() - 1) as f64;

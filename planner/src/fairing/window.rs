@@ -6,10 +6,13 @@ const GRID: f64 = 0.002;
 const PLACE: f64 = 0.2;
 const HEADING: f64 = 0.4;
 const JOINTS: f64 = 0.4;
-/// Steepest change of a window's share along the way. \[1/m\]
+/// Steepest change along the way of a window's share, and of a bend's room. \[1/m\]
 const STEEPEST: f64 = 8.0;
+const STEEPEST_ROOM: f64 = 25.0;
 /// Half of the length over which changes of the share are rounded. \[m\]
 const ROUNDED: f64 = 0.02;
+/// How many times that length it is looked farther for room to narrow.
+const AROUND: i32 = 12;
 /// A window that would be narrower than this share is none.
 const NARROWEST: f64 = 0.05;
 
@@ -30,12 +33,15 @@ pub(super) struct Windows {
     pad: Shares,
     /// Of the joints: where the pad goes, and so what it sweeps, does not depend on them.
     joints: Shares,
+    /// Of what the way may be bent aside.
+    bend: Shares,
 }
 
 impl Windows {
     /// The widest, along a piece of some length. \[m\]
     pub(super) fn new(length: f64) -> Self {
-        Self { pad: Shares::new(length), joints: Shares::new(length) }
+        let [pad, joints] = std::array::from_fn(|_| Shares::new(length, STEEPEST));
+        Self { pad, joints, bend: Shares::new(length, STEEPEST_ROOM) }
     }
 
     /// At a place of it. At its ends there is none, so that it ends where it did.
@@ -45,6 +51,23 @@ impl Windows {
             heading: self.pad.of(HEADING, u),
             joints: self.joints.of(JOINTS, u),
         }
+    }
+
+    /// The share of the room there is that the way may be bent aside by at a place.
+    pub(super) fn room(&self, u: f64) -> f64 {
+        self.bend.share(u)
+    }
+
+    /// Halves that room around some places, where none is left a little farther around them; whether any
+    /// was left to halve.
+    pub(super) fn narrow_room(&mut self, places: &[f64]) -> bool {
+        (0..=AROUND).any(|k| {
+            let aside = f64::from(k) * ROUNDED;
+            let around = places.iter().flat_map(|u| [(u - aside).max(0.0), u + aside]);
+            let mut around: Vec<f64> = around.collect();
+            around.sort_by(f64::total_cmp);
+            self.bend.narrow(&around, 0.0)
+        })
     }
 
     /// Halves the pad's windows around some places, down to `least` of the widest; whether any was left
@@ -63,6 +86,8 @@ impl Windows {
 /// Shares of the widest window along a piece.
 struct Shares {
     length: f64,
+    /// Their steepest change. \[1/m\]
+    steepest: f64,
     /// As asked for.
     asked: Vec<f64>,
     /// Rounded.
@@ -70,25 +95,29 @@ struct Shares {
 }
 
 impl Shares {
-    fn new(length: f64) -> Self {
+    fn new(length: f64, steepest: f64) -> Self {
         let count = (length / GRID).ceil().max(1.0) as usize + 1;
         let whole = vec![1.0; count];
-        Self { length, asked: whole.clone(), shares: whole }
+        Self { length, steepest, asked: whole.clone(), shares: whole }
     }
 
     /// The window at a place of which this is the widest. \[m\]
     fn of(&self, width: f64, u: f64) -> f64 {
-        let last = (self.shares.len() - 1) as f64;
-        let place = (u / self.length * last).clamp(0.0, last);
-        let k = (place as usize).min(self.shares.len().saturating_sub(2));
-        let rest = place - k as f64;
-        let share = self.shares[k] * (1.0 - rest) + self.shares[k + 1] * rest;
         let room = 2.0 * u.min(self.length - u).max(0.0);
-        match share * width {
+        match self.share(u) * width {
             0.0 => 0.0,
             _ if room == 0.0 => 0.0,
             wide => wide * room / (wide.powi(4) + room.powi(4)).powf(0.25),
         }
+    }
+
+    /// At a place.
+    fn share(&self, u: f64) -> f64 {
+        let last = (self.shares.len() - 1) as f64;
+        let place = (u / self.length * last).clamp(0.0, last);
+        let k = (place as usize).min(self.shares.len().saturating_sub(2));
+        let rest = place - k as f64;
+        self.shares[k] * (1.0 - rest) + self.shares[k + 1] * rest
     }
 
     fn narrow(&mut self, places: &[f64], least: f64) -> bool {
@@ -105,7 +134,7 @@ impl Shares {
             let half = if 0.5 * share < NARROWEST { 0.0 } else { 0.5 * share };
             self.asked[k] = half.max(least).min(share);
         }
-        let step = STEEPEST * spacing;
+        let step = self.steepest * spacing;
         for k in 1..count {
             self.asked[k] = self.asked[k].min(self.asked[k - 1] + step);
         }

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 use nullsweep_robot::{Arm, Footprint};
 
-use super::coverage::visit_swept;
 use super::sight::Sight;
+use super::visit::visit_swept;
 use crate::plan::Trajectory;
 
 /// Joints move at most this far between two looks. \[rad\] or \[m\]

@@ -12,6 +12,7 @@ mod percentile;
 mod segment;
 mod sight;
 mod view;
+mod visit;
 
 pub use deposit::{Clock, deposits};
 pub use held::{Held, Slower};
@@ -22,3 +23,4 @@ pub use passes::{Passes, passes_over};
 pub(crate) use percentile::percentile;
 pub use segment::distance_to_segment;
 pub use sight::{Sight, solids};
+pub(crate) use visit::visit_swept;

@@ -3,10 +3,10 @@
 use nullsweep_robot::Arm;
 use serde::{Deserialize, Serialize};
 
-use super::coverage::{enough, visit_swept};
 use super::pads::contact_motion;
 use super::percentile::percentile;
 use super::sight::Sight;
+use super::visit::{enough, visit_swept};
 use crate::plan::Trajectory;
 
 /// So many passes and more are counted together.

@@ -3,6 +3,7 @@
 
 mod accelerate;
 mod bang_bang;
+mod estimate;
 mod jerk;
 mod optimal;
 mod sampled;
@@ -12,6 +13,7 @@ mod speed;
 
 pub use accelerate::{Pace, Rest, accelerate, paced};
 pub use bang_bang::{bang_bang, segment_ns, set_times};
+pub use estimate::arrivals;
 pub use sampled::{Timed, timed};
 pub use smooth::smooth;
 pub use smooth_path::{Piece, SmoothPath};

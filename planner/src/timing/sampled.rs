@@ -65,8 +65,8 @@ pub(super) fn braked(run: &SmoothPath, limits: &Limits, share: f64) -> Option<Ve
 }
 
 /// One grid interval with the piece that it is a part of.
-struct Cell {
-    piece: Piece,
+pub(super) struct Cell {
+    pub(super) piece: Piece,
     /// Which piece of the run.
     index: usize,
 }
@@ -79,19 +79,7 @@ fn run_knots(
     from_ns: u64,
 ) -> Option<Vec<Timed>> {
     let cells = cells(run);
-    let mut intervals: Vec<Interval> = cells
-        .iter()
-        .map(|c| Interval {
-            length: c.piece.length,
-            slope: c.piece.slope,
-            bend: c.piece.bend,
-            share,
-            caps: [0.0, c.piece.length].map(|s| {
-                let source = c.piece.source[usize::from(s > 0.0)];
-                cap(source, &c.piece.at(s), &c.piece.slope_at(s)).powi(2)
-            }),
-        })
-        .collect();
+    let mut intervals = intervals(&cells, share, cap);
     for _ in 0..ROUNDS {
         let x = squared_speeds(&intervals, limits, start * start)?;
         let (knots, ends) = place(&cells, &x, from_ns);
@@ -130,8 +118,23 @@ fn run_knots(
     Some(slowed)
 }
 
+/// What the cells ask of the speed along them, of which `share` of the limits may be used.
+pub(super) fn intervals(cells: &[Cell], share: f64, cap: &SpeedCap<'_>) -> Vec<Interval> {
+    let of = |Cell { piece, .. }: &Cell| Interval {
+        length: piece.length,
+        slope: piece.slope,
+        bend: piece.bend,
+        share,
+        caps: [0.0, piece.length].map(|s| {
+            let source = piece.source[usize::from(s > 0.0)];
+            cap(source, &piece.at(s), &piece.slope_at(s)).powi(2)
+        }),
+    };
+    cells.iter().map(of).collect()
+}
+
 /// The grid: every piece in equal parts.
-fn cells(run: &SmoothPath) -> Vec<Cell> {
+pub(super) fn cells(run: &SmoothPath) -> Vec<Cell> {
     let mut cells = Vec::new();
     let last = run.pieces.len().saturating_sub(1);
     for (index, piece) in run.pieces.iter().enumerate() {

@@ -76,7 +76,6 @@ fn fifty_starts_end_in_the_same_place() {
     let (spread, off) = (most(&found[0]), most(&Isometry3::identity()));
     println!("apart {spread:.3?}, from the trajectory {off:.3?} mm and degrees");
     assert!(spread.0 < 0.3 && spread.1 < 0.1, "{spread:?}");
-    // The turn is left out: iterative closest points of any kind, started at the trajectory's own pose,
-    // leave it by half a degree to one and a half, as the camera's distortion has it.
-    assert!(off.0 < 3.0, "{off:?}");
+    // That trajectory is an estimate too, of all of the room: it leaves 0.5° between the two views' floors.
+    assert!(off.0 < 3.0 && off.1 < 0.65, "{off:?}");
 }

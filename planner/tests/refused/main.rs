@@ -7,6 +7,7 @@ mod common;
 mod keep_out;
 mod pad;
 mod stage;
+mod tool;
 
 use case::Case;
 use nullsweep_ipc_types::Knot;
@@ -26,6 +27,8 @@ fn cases(kind: ViolationKind) -> Vec<Case> {
         ViolationKind::SoftLimit => limits(),
         ViolationKind::Collision => collisions::cases(),
         ViolationKind::KeepOut => keep_out::cases(),
+        ViolationKind::StandOff => tool::cases_of_stand_off(),
+        ViolationKind::Slip => tool::cases_of_slip(),
     }
 }
 
@@ -39,7 +42,9 @@ fn after(kind: ViolationKind) -> Option<ViolationKind> {
         ViolationKind::Jerk => ViolationKind::SoftLimit,
         ViolationKind::SoftLimit => ViolationKind::Collision,
         ViolationKind::Collision => ViolationKind::KeepOut,
-        ViolationKind::KeepOut => return None,
+        ViolationKind::KeepOut => ViolationKind::StandOff,
+        ViolationKind::StandOff => ViolationKind::Slip,
+        ViolationKind::Slip => return None,
     })
 }
 

@@ -2,6 +2,7 @@
 //! arm does what it was told.
 
 use std::collections::HashMap;
+use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -9,11 +10,67 @@ use nullsweep_ipc_types::ports::{Receiver, now_ns};
 use nullsweep_ipc_types::{EventKind, Mode, PlanEvent, PlanId};
 
 use super::proxy::{Line, Proxy};
-use super::rig::{PlannerHost, RobotHost, ask, end, free, life, log, newest, wait_for};
+use super::rig::{
+    PlannerHost, RobotHost, ask, end, end_of, free, life, log, newest, relay, wait_for,
+};
 
 const PLANS: usize = 24;
 /// How long one plan takes. \[s\]
 const TAKES: f64 = 0.5;
+/// How long a link is cut.
+pub(crate) const CUT: Duration = Duration::from_secs(3);
+
+/// What lies between two hosts.
+pub(crate) trait Road {
+    /// Where the robot's end listens, in zenoh's words.
+    fn listens(&self) -> String;
+    /// Where the planner's end finds it.
+    fn connects(&self) -> String;
+    /// `relay` on the robot's host.
+    fn robot(&self) -> Command;
+    /// `relay` on the planner's host.
+    fn planner(&self) -> Command;
+    /// Lets nothing through for [`CUT`]; with `silent` the hosts are told nothing of it.
+    fn cut(&self, silent: bool);
+    /// How many segments or packets went, and how many of them were lost.
+    fn lost(&self) -> (u64, u64);
+}
+
+/// A proxy on loopback.
+struct Loopback {
+    endpoint: String,
+    proxy: Proxy,
+}
+
+impl Road for Loopback {
+    fn listens(&self) -> String {
+        self.endpoint.clone()
+    }
+
+    fn connects(&self) -> String {
+        format!("tcp/127.0.0.1:{}", self.proxy.port)
+    }
+
+    fn robot(&self) -> Command {
+        relay()
+    }
+
+    fn planner(&self) -> Command {
+        relay()
+    }
+
+    fn cut(&self, silent: bool) {
+        self.proxy.set(if silent { Line::Silent } else { Line::Cut });
+        thread::sleep(CUT);
+        // What was under way on a silent line is lost with its connection.
+        self.proxy.set(Line::Cut);
+        self.proxy.set(Line::Stands);
+    }
+
+    fn lost(&self) -> (u64, u64) {
+        self.proxy.count()
+    }
+}
 
 /// Every event of a world, by plan.
 #[derive(Debug, Default)]
@@ -46,14 +103,17 @@ impl Book {
 
 #[test]
 fn every_plan_has_one_outcome_through_losses_and_cuts() {
-    let (mut robot, planner) = (RobotHost::start(), PlannerHost::new());
     let (endpoint, port) = free("tcp");
-    let proxy = Proxy::to(port, 200);
-    let through = format!("tcp/127.0.0.1:{}", proxy.port);
+    every_plan_has_one_outcome(&Loopback { endpoint, proxy: Proxy::to(port, 200) });
+}
+
+pub(crate) fn every_plan_has_one_outcome(road: &dyn Road) {
+    let (mut robot, planner) = (RobotHost::start(), PlannerHost::new());
     let (there, here) = (robot.root.path().to_path_buf(), planner.root.path());
-    let listen = ["robot", "--listen", &endpoint, "--telemetry", "20"];
-    let _far = end(&there, Some(&there), &listen);
-    let _near = end(here, Some(here), &["planner", "--connect", &through, "--plan-within", "6"]);
+    let listen = ["robot", "--listen", &road.listens(), "--unprotected", "--telemetry", "20"];
+    let _far = end_of(road.robot(), &there, Some(&there), &listen);
+    let connect = ["planner", "--connect", &road.connects(), "--plan-within", "6"];
+    let _near = end_of(road.planner(), here, Some(here), &connect);
     planner.wait();
     let (mut sender_book, mut robot_book) = (Book::default(), Book::default());
     let events = planner.ipc.event_receiver().unwrap();
@@ -71,18 +131,14 @@ fn every_plan_has_one_outcome_through_losses_and_cuts() {
         plans.push(id);
         // In the plan's way, in its motion, and unnoticed.
         let cut = match i {
-            4 => Some((0.005, Line::Cut)),
-            12 => Some((0.3, Line::Cut)),
-            18 => Some((0.2, Line::Silent)),
+            4 => Some((0.005, false)),
+            12 => Some((0.3, false)),
+            18 => Some((0.2, true)),
             _ => None,
         };
-        if let Some((after, line)) = cut {
+        if let Some((after, silent)) = cut {
             thread::sleep(Duration::from_secs_f64(after));
-            proxy.set(line);
-            thread::sleep(Duration::from_secs(3));
-            // What was under way on a silent line is lost with its connection.
-            proxy.set(Line::Cut);
-            proxy.set(Line::Stands);
+            road.cut(silent);
         }
         let end = published + Duration::from_secs(20);
         while sender_book.outcomes(id).1 == 0 && !sender_book.is_refused(id) && Instant::now() < end
@@ -130,7 +186,7 @@ fn every_plan_has_one_outcome_through_losses_and_cuts() {
     let seen = robot.finish();
     assert!(seen.worst <= 1.0, "{seen:?}");
     admitted.sort_by(f64::total_cmp);
-    let (segments, lost) = proxy.count();
+    let (segments, lost) = road.lost();
     println!(
         "{PLANS} plans, {segments} segments, {lost} lost ({:.1} %), 3 cuts of 3 s: {finished} finished, \
          {refused} refused, each once; admission after {:.2} s in the median, {:.2} s at most; ends \

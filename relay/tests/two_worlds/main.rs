@@ -3,6 +3,7 @@
 
 mod carried;
 mod cuts;
+mod namespaces;
 mod proxy;
 mod refused;
 mod rig;

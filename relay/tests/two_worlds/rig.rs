@@ -172,9 +172,22 @@ fn endpoint(ipc: &Ipc, arm: &Arm, over: &AtomicBool) -> Seen {
     seen
 }
 
+pub(crate) fn relay() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_relay"))
+}
+
 /// An end of the relay, its log in a file of `folder`.
 pub(crate) fn end(folder: &Path, root: Option<&Path>, words: &[&str]) -> Process {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_relay"));
+    end_of(relay(), folder, root, words)
+}
+
+/// The same by a command that starts it.
+pub(crate) fn end_of(
+    mut command: Command,
+    folder: &Path,
+    root: Option<&Path>,
+    words: &[&str],
+) -> Process {
     command.args(words).current_dir(folder).env("NULLSWEEP_CELL", "");
     if let Some(root) = root {
         command.arg("--ipc-root").arg(root);
@@ -194,7 +207,7 @@ pub(crate) fn log(folder: &Path, end: &str) -> String {
 
 /// `relay ask`, to its end.
 pub(crate) fn ask(folder: &Path, words: &[&str]) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_relay"));
+    let mut command = relay();
     command.arg("ask").args(words).current_dir(folder).env("NULLSWEEP_CELL", "");
     let Output { status, stdout, stderr } = command.output().unwrap();
     let text = String::from_utf8_lossy(&stdout) + String::from_utf8_lossy(&stderr);

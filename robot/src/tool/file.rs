@@ -1,16 +1,18 @@
 //! A tool as it stands in files: the keys that its shape has, and no others.
 
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::error::ToolError;
 use super::footprint::{Camera, Footprint, Nozzle, Roller};
-use super::{Tool, ToolError};
+use super::tool::Tool;
 
 /// All keys of all shapes. Those of a rectangle stand in their old order, so that a plan's tool is
 /// written as it was.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ToolFile {
+struct ToolFile {
     /// For people.
     name: String,
     /// `rectangle` (a pad; where nothing is said), `disc` (a round pad, its heading free), `roller`
@@ -148,7 +150,7 @@ impl ToolFile {
     }
 
     /// The tool, if there can be one.
-    pub(super) fn tool(self) -> Result<Tool, ToolError> {
+    fn tool(self) -> Result<Tool, ToolError> {
         let shape = self.shape.name();
         let keys = self.shape.keys();
         let foreign = self.said().into_iter().find(|(field, is)| *is && !keys.contains(field));
@@ -274,8 +276,35 @@ impl From<&Tool> for ToolFile {
     }
 }
 
+impl Serialize for Tool {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        ToolFile::from(self).serialize(out)
+    }
+}
+
+impl<'de> Deserialize<'de> for Tool {
+    fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
+        ToolFile::deserialize(input)?.tool().map_err(D::Error::custom)
+    }
+}
+
 /// An axis across another one.
 fn beside(axis: &[f64; 3]) -> [f64; 3] {
     let axis = Vector3::from(*axis);
     Vector3::ith(axis.iamin(), 1.0).cross(&axis).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_tells_only_of_tools_that_can_be() {
+        let text = serde_json::to_string(&Tool::default()).expect("numbers");
+        assert_eq!(serde_json::from_str::<Tool>(&text).expect("a tool"), Tool::default());
+        let thin = text.replace("\"thickness\":0.03", "\"thickness\":-0.03");
+        let said = serde_json::from_str::<Tool>(&thin).expect_err("thinner than nothing");
+        assert!(said.to_string().contains("thickness is -0.03 m"), "{said}");
+        assert!(serde_json::from_str::<Tool>(&text.replace("width", "breadth")).is_err());
+    }
 }

@@ -149,11 +149,12 @@ const PLANNER: &[(&str, &[&str])] = &[
     // 2
     ("plan", &["progress", "cost", "regions", "workcell"]),
     ("roadmap", &["progress", "cost", "workcell", "plan"]),
-    // 3: none imports another but sweep; what the search knows is kept from verify
+    // 3: none imports another but sweep, and fairing timing; what the search knows is kept from verify
     ("sweep", &["progress", "cost", "workcell", "plan", "roadmap"]),
     ("tour", BELOW_3),
     ("motion", BELOW_3),
-    ("fairing", BELOW_3),
+    // Ways are bent for the time that they take.
+    ("fairing", &["progress", "cost", "workcell", "plan", "roadmap", "sweep", "timing"]),
     ("timing", BELOW_3),
     ("verify", &["progress", "cost", "regions", "workcell", "plan", "sweep"]),
     ("link", BELOW_3),

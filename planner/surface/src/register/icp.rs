@@ -3,78 +3,78 @@
 use nalgebra::{Isometry3, Point3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use super::cloud::{Cloud, Thin};
-use super::pairs::Fit;
+use super::cloud::Cloud;
+use super::pairs::{Fit, Metric};
 use super::result::{FARTHEST, HOLD, OVERLAP, RESIDUAL, RegisterError, Registration};
 use crate::scan::View;
 
 /// A counterpart lies at most this far away. \[m\]
 const COUNTERPART: f64 = 0.02;
 
-/// One level: how far a counterpart may be \[m\], how the clouds are thinned, how many steps at most,
-/// and how much a distance along the surface counts beside one across.
-struct Level {
+/// A level that goes across the surface: how far a counterpart may be, and the side of the voxels that
+/// the clouds are thinned to. \[m\]
+struct Coarse {
     reach: f64,
-    thin: Thin,
-    steps: usize,
-    along: f64,
+    voxel: f64,
 }
 
-/// From coarse to fine; the first three from every start, the others from the best.
-const LEVELS: [Level; 5] = [
-    Level { reach: 0.20, thin: Thin::Voxel(0.030), steps: 25, along: 0.0 },
-    Level { reach: 0.10, thin: Thin::Voxel(0.020), steps: 25, along: 0.0 },
-    Level { reach: 0.05, thin: Thin::Voxel(0.012), steps: 25, along: 0.0 },
-    Level { reach: 0.03, thin: Thin::Points(2_000), steps: 100, along: 1.0 },
-    Level { reach: COUNTERPART, thin: Thin::Points(6_000), steps: 300, along: 1.0 },
+/// From coarse to fine, from every start.
+const COARSE: [Coarse; 3] = [
+    Coarse { reach: 0.20, voxel: 0.030 },
+    Coarse { reach: 0.10, voxel: 0.020 },
+    Coarse { reach: 0.05, voxel: 0.012 },
 ];
-/// Levels that are gone through from every start.
-const COARSE: usize = 3;
+/// Steps on each such level, at most.
+const STEPS: usize = 25;
 /// Coarse results that are refined.
 const CANDIDATES: usize = 4;
-/// Most points of the other views on the levels that take points themselves.
-const OTHERS: usize = 60_000;
+/// How many points of each side look for a counterpart where a result is refined, and in how many
+/// steps at most: what looks alike across the surface is told apart along it.
+const FINE: [(usize, usize); 2] = [(2_000, 100), (MOST, 300)];
+/// How far that counterpart may be. \[m\]
+const FINE_REACH: f64 = 0.05;
+/// Points of the view by which the result is judged.
+const MOST: usize = 6_000;
+/// Points of each side among which counterparts are looked for.
+const DENSE: usize = 60_000;
 
 /// Lays a view onto others.
 ///
 /// # Errors
 /// [`RegisterError`] with the figures of the best fit where that is not to be trusted.
 pub fn register(others: &[View], view: &View) -> Result<Registration, RegisterError> {
-    let cloud = |views: &[View], most: Option<usize>, level: &Level| match level.thin {
-        Thin::Points(points) => Cloud::of(views, Thin::Points(most.unwrap_or(points))),
-        voxel => Cloud::of(views, voxel),
-    };
-    let target: Vec<Cloud> = LEVELS.iter().map(|l| cloud(others, Some(OTHERS), l)).collect();
-    let moving: Vec<Cloud> =
-        LEVELS.iter().map(|l| cloud(std::slice::from_ref(view), None, l)).collect();
-    let finest = LEVELS.len() - 1;
-    let middle = middle(&moving[finest].points);
-    let last = COARSE - 1;
-    let mut coarse: Vec<(Isometry3<f64>, f64)> = starts(&middle)
+    let view = std::slice::from_ref(view);
+    let coarse: Vec<[Cloud; 2]> =
+        COARSE.iter().map(|l| [others, view].map(|v| Cloud::coarse(v, l.voxel))).collect();
+    let [target, moving] = &[others, view].map(|views| Cloud::fine(views, DENSE));
+    let middle = middle(&moving.points);
+    let last = &COARSE[COARSE.len() - 1];
+    let mut found: Vec<(Isometry3<f64>, f64)> = starts(&middle)
         .into_par_iter()
         .map(|start| {
-            let (target, moving) = (&target[..COARSE], &moving[..COARSE]);
-            let pose = descend(target, moving, &LEVELS[..COARSE], start, &middle);
-            (pose, Fit::new(&target[last], &moving[last], &pose, LEVELS[last].reach).score())
+            let pose = coarse.iter().zip(&COARSE).fold(start, |pose, ([target, moving], level)| {
+                let fit = |pose: &_| Fit::new(target, moving, pose, level.reach, usize::MAX);
+                descend(fit, Metric::Across, STEPS, pose, &middle)
+            });
+            let [target, moving] = &coarse[coarse.len() - 1];
+            (pose, Fit::new(target, moving, &pose, last.reach, usize::MAX).score())
         })
         .collect();
-    coarse.sort_by(|a, b| a.1.total_cmp(&b.1));
-    coarse.dedup_by(|a, b| is_same(&a.0, &b.0, &middle));
-    coarse.truncate(CANDIDATES);
-    // What looks alike across the surface is told apart along it.
-    let (target, moving) = (&target[COARSE..], &moving[COARSE..]);
-    let fine: Vec<(Isometry3<f64>, f64)> = coarse
+    found.sort_by(|a, b| a.1.total_cmp(&b.1));
+    found.dedup_by(|a, b| is_same(&a.0, &b.0, &middle));
+    found.truncate(CANDIDATES);
+    let fine: Vec<(Isometry3<f64>, f64)> = found
         .into_par_iter()
         .map(|(start, _)| {
-            let pose = descend(target, moving, &LEVELS[COARSE..], start, &middle);
-            let fit =
-                Fit::new(&target[target.len() - 1], &moving[moving.len() - 1], &pose, COUNTERPART);
-            (pose, fit.apart())
+            let pose = FINE.iter().fold(start, |pose, (most, steps)| {
+                let fit = |pose: &_| Fit::both(target, moving, pose, FINE_REACH, *most);
+                descend(fit, Metric::Noise, *steps, pose, &middle)
+            });
+            (pose, Fit::new(target, moving, &pose, COUNTERPART, MOST).apart())
         })
         .collect();
     let best = fine.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     let correction = best.map_or_else(Isometry3::identity, |best| best.0);
-    let (target, moving) = (&target[target.len() - 1], &moving[moving.len() - 1]);
     let found = figures(target, moving, &correction, &middle);
     if found.overlap < OVERLAP {
         Err(RegisterError::Overlap { found })
@@ -125,35 +125,34 @@ fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>, middle: &Point3<f64>) -> bool
     (a * middle - b * middle).norm() < 0.002 && turned < 0.005
 }
 
-/// Goes down level by level from a start.
+/// Goes down a level from a start.
 fn descend(
-    target: &[Cloud],
-    moving: &[Cloud],
-    levels: &[Level],
+    fit: impl Fn(&Isometry3<f64>) -> Fit,
+    metric: Metric,
+    steps: usize,
     start: Isometry3<f64>,
     middle: &Point3<f64>,
 ) -> Isometry3<f64> {
     let mut pose = start;
-    for ((target, moving), level) in target.iter().zip(moving).zip(levels) {
-        for _ in 0..level.steps {
-            let fit = Fit::new(target, moving, &pose, level.reach);
-            if fit.pairs.len() < 20 {
-                break;
-            }
-            let there = pose * middle;
-            let (mut matrix, right, total) = fit.equations(&there, 1.0, level.along);
-            // A trace of damping keeps what slides in place.
-            for i in 0..6 {
-                matrix[(i, i)] += 1e-6 * total.max(1.0);
-            }
-            let Some(step) = matrix.cholesky().map(|c| c.solve(&right)) else { break };
-            let turn = UnitQuaternion::from_scaled_axis(step.fixed_rows::<3>(0).into_owned());
-            let shift = Translation3::from(step.fixed_rows::<3>(3).into_owned());
-            let centre = Translation3::from(there.coords);
-            pose = shift * centre * turn * centre.inverse() * pose;
-            if step.norm() < 1e-6 {
-                break;
-            }
+    for _ in 0..steps {
+        let fit = fit(&pose);
+        if fit.pairs.len() < 20 {
+            break;
+        }
+        let there = pose * middle;
+        let (mut matrix, right, total) = fit.equations(&there, 1.0, metric);
+        // A trace of damping keeps what slides in place.
+        let most = matrix.diagonal().max().max(total).max(1.0);
+        for i in 0..6 {
+            matrix[(i, i)] += 1e-6 * most;
+        }
+        let Some(step) = matrix.cholesky().map(|c| c.solve(&right)) else { break };
+        let turn = UnitQuaternion::from_scaled_axis(step.fixed_rows::<3>(0).into_owned());
+        let shift = Translation3::from(step.fixed_rows::<3>(3).into_owned());
+        let centre = Translation3::from(there.coords);
+        pose = shift * centre * turn * centre.inverse() * pose;
+        if step.norm() < 1e-6 {
+            break;
         }
     }
     pose
@@ -165,12 +164,12 @@ fn figures(
     correction: &Isometry3<f64>,
     middle: &Point3<f64>,
 ) -> Registration {
-    let fit = Fit::new(target, moving, correction, COUNTERPART);
-    let before = Fit::new(target, moving, &Isometry3::identity(), COUNTERPART);
+    let fit = Fit::new(target, moving, correction, COUNTERPART, MOST);
+    let before = Fit::new(target, moving, &Isometry3::identity(), COUNTERPART, MOST);
     let there = correction * middle;
     let apart = moving.points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>();
     let size = (apart / moving.points.len().max(1) as f64).sqrt().max(1e-3);
-    let (matrix, _, total) = fit.equations(&there, size, 0.0);
+    let (matrix, _, total) = fit.equations(&there, size, Metric::Across);
     let least = SymmetricEigen::new(matrix / total.max(1e-9)).eigenvalues.min();
     let overlap = |fit: &Fit| fit.pairs.len() as f64 / fit.of.max(1) as f64;
     Registration {
