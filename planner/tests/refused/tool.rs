@@ -20,18 +20,20 @@ fn first_on_surface(plan: &Plan) -> usize {
 
 pub(crate) fn cases_of_stand_off() -> Vec<Case> {
     let s = stage();
-    let case = |what, plan: &Plan, distance, reach_angle, says: &str| {
+    // The pad's plane is 4 mm in the surface.
+    let case = |what, plan: &Plan, back: f64, reach_angle, says: &str| {
         let plan = with(plan, |tool| {
-            let field_of_view = [0.8, 0.6];
-            tool.footprint = Footprint::Camera(Camera { distance, field_of_view });
-            tool.reach_angle = reach_angle;
+            let camera = Camera { distance: [0.005, 0.05], field_of_view: [0.8, 0.6] };
+            tool.footprint = Footprint::Camera(camera);
+            tool.centre[0] -= back;
+            (tool.stand_off, tool.reach_angle) = (0.016, reach_angle);
         });
         let knot = first_on_surface(&plan);
         Case { also: &[ViolationKind::Collision], ..Case::new(what, plan, knot, says) }
     };
     vec![
-        case("a camera too near", &s.bang, [0.2, 0.4], 0.5, "0.2 to 0.4 m are its own"),
-        case("one that looks aslant", &s.smooth, [-1.0, 1.0], 0.0, "at most 0 is its reach_angle"),
+        case("a camera too near", &s.bang, 0.005, 0.5, "0.005 to 0.05 m are its own"),
+        case("one that looks aslant", &s.smooth, 0.02, 0.0, "at most 0 is its reach_angle"),
     ]
 }
 
@@ -51,6 +53,7 @@ pub(crate) fn cases_of_slip() -> Vec<Case> {
     let case = |what, plan: &Plan, across, symmetric, says: &str| {
         let plan = with(plan, |tool| {
             tool.footprint = Footprint::Roller(Roller { radius: 0.02, slip_max: 0.05 });
+            tool.width = 0.03;
             (tool.across, tool.symmetric) = (across, symmetric);
         });
         let knot = gone(&plan);
