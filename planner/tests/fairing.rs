@@ -47,13 +47,17 @@ fn a_fair_way_is_faster_sweeps_as_much_and_begins_and_ends_where_it_did() {
     let swept = |o: &Outcome| o.figures.verification.coverage_reachable;
     assert!(swept(&curves) >= swept(&lines) - 0.0035, "{} {}", swept(&lines), swept(&curves));
     assert!(after.verification.line_deviation_max_m <= 1.6e-4);
-    assert!(after.task_time_s < 0.75 * before.task_time_s, "{before:?}\n{after:?}");
+    // Averaged alone it is 0.59 of it, bent besides 0.46.
+    assert!(after.task_time_s < 0.52 * before.task_time_s, "{before:?}\n{after:?}");
     assert!(2 * after.pace.dips < before.pace.dips, "{:?} {:?}", before.pace, after.pace);
     assert!(after.effort_rad < 0.9 * before.effort_rad);
     assert!(after.verification.press.press_max_m <= curves.plan.tool.press_max);
     // The same patches, in the same order.
     let patches = |o: &Outcome| o.plan.knots.iter().filter_map(|k| k.patch).collect::<Vec<_>>();
     assert_eq!(patches(&curves), patches(&lines));
+    // One thread makes the same plan.
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    assert_eq!(one.install(|| plan(true, Profile::Acceleration)).plan, curves.plan);
     let [lines, curves] = [false, true].map(|smooth| plan(smooth, Profile::Velocity));
     assert_eq!(ends(&curves.plan), ends(&lines.plan));
     assert_eq!(curves.figures.verification.violations, []);
