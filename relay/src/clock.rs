@@ -7,6 +7,8 @@ use crate::wire::Reading;
 /// Readings that are remembered: one a second, so clocks that go apart by 50 µs a second are told
 /// apart by no more than 3 ms.
 const REMEMBERED: usize = 64;
+/// By how much clocks go apart while a reading is remembered. \[ns\]
+const APART_NS: u64 = 3_000_000;
 
 /// How much the robot's `CLOCK_MONOTONIC` is ahead of this one: from the reading that was back soonest.
 #[derive(Clone, Debug, Default)]
@@ -42,6 +44,12 @@ impl Clock {
         Some(here_ns.saturating_add_signed(self.ahead()?.0))
     }
 
+    /// The same, as early as it can have been: an executor refuses a plan that is from the future.
+    pub fn earliest_there(&self, here_ns: u64) -> Option<u64> {
+        let (_, error) = self.ahead()?;
+        Some(self.there(here_ns)?.saturating_sub(error + APART_NS))
+    }
+
     /// A moment of the robot's clock, in this one's.
     pub fn here(&self, there_ns: u64) -> Option<u64> {
         Some(there_ns.saturating_add_signed(self.ahead()?.0.checked_neg()?))
@@ -61,6 +69,10 @@ mod tests {
         clock.take(Reading { asked_ns: 6000, answered_ns: 5400 }, 6420);
         assert_eq!(clock.ahead(), Some((-1000, 40)));
         assert_eq!((clock.there(9000), clock.here(8000)), (Some(8000), Some(9000)));
+        // What was published before it was asked at 5000 was so before it was answered at 4040.
+        let late = 4_000_000_000;
+        let earliest = clock.earliest_there(late + 5000).expect("there are readings");
+        assert_eq!(earliest, late + 4000 - 40 - APART_NS);
         for i in 0..REMEMBERED as u64 {
             clock.take(Reading { asked_ns: i * 1000, answered_ns: i * 1000 + 150 }, i * 1000 + 100);
         }

@@ -306,7 +306,7 @@ impl<'a> PlannerEnd<'a> {
 
     fn plan(&mut self, plan: &ReceivedPlan) -> anyhow::Result<()> {
         let header = *plan.header();
-        let Some(epoch) = self.clock.there(header.id.epoch) else { return Ok(()) };
+        let Some(epoch) = self.clock.earliest_there(header.id.epoch) else { return Ok(()) };
         let id = PlanId { epoch, ..header.id };
         let parcel = Parcel { id, within_ns: self.within_ns };
         let knots: &[u8] = bytemuck::cast_slice(plan.knots());

@@ -44,7 +44,7 @@ def keywords(name):
 
 def test_every_setting_is_a_flag_and_every_flag_a_setting(planner):
     scan = {"up", "sensor_height", "sensor_pose", "support_height", "scale", "as_placed", "table",
-            "unseen", "crop", "object", "obstacles", "demo"}
+            "unseen", "crop", "object", "obstacles", "regions", "demo"}
     cell = {"urdf", "arm", "package", "fit_capsules", "srdf", "posture", "tool", "torso", "held",
             "robot_name", "ipc_root", "cell"}
     shell = {"out", "json", "report", "help", "continue", "again", "scene", "quat", "offset"}
