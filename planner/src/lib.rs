@@ -22,6 +22,7 @@
 //! The modules are storeys: each imports only those above it in this list, and is a function from
 //! one plain type to the next. Each can be called alone.
 
+mod band;
 pub mod cost;
 pub mod cover;
 pub mod progress;

@@ -194,7 +194,9 @@ pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> 
     } else if let Some([reachable, all]) = arm.and_then(|arm| swept(plan, arm)) {
         let share = |share: f64| format!("{:.1} %", 100.0 * share);
         let (reachable, all) = (share(reachable), share(all));
-        line("sweeps", &format!("{reachable} of what is reachable, {all} of all points"));
+        // Other things that may stand before it are not in a plan.
+        let seen = if plan.tool.touches() { "" } else { ", by what its own surface hides alone" };
+        line("sweeps", &format!("{reachable} of what is reachable, {all} of all points{seen}"));
     }
     let on_surface = plan.knots.last().is_some_and(|knot| knot.line.is_some());
     line("ends", if on_surface { "on the surface" } else { "off the surface" });

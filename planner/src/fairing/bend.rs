@@ -80,7 +80,7 @@ impl Bend {
         self.weights(u).fold(Offset::NONE, add)
     }
 
-    /// What makes the piece as it was at a place: no control bends it there.
+    /// Takes a control's bend out.
     pub(super) fn straighten(&mut self, control: usize) {
         self.controls[control] = Offset::NONE;
     }

@@ -14,7 +14,7 @@ use crate::workcell::{Bed, Workcell};
 
 /// Rounds of narrowing windows, or the room of a bend, where a piece cannot be followed.
 const ROUNDS: usize = 40;
-/// Farther from the pad's centre a point is none of its. \[m\]
+/// Farther from the pad's centre, and than twice its reach, a point is none of its. \[m\]
 const FAR: f64 = 0.15;
 
 /// A piece and what has become of it.
@@ -120,7 +120,8 @@ impl Fair {
     /// not bent. \[m\]
     pub(super) fn miss(&self, point: &Point3<f64>, tool: &Tool) -> Option<(f64, f64)> {
         let bent = self.bent.as_ref()?.iter();
-        let near = |s: &&Station| (s.pose.translation.vector - point.coords).norm() < FAR;
+        let far = FAR.max(2.0 * tool.outer_radius());
+        let near = |s: &&Station| (s.pose.translation.vector - point.coords).norm() < far;
         let misses = bent.filter(near).map(|s| (missed_by(point, &s.pose, tool), s.u));
         misses.min_by(|a, b| a.0.total_cmp(&b.0))
     }

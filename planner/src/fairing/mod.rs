@@ -9,7 +9,6 @@
 //! does not go, collides, or sweeps too little, the window is narrowed and the piece made again;
 //! without a window it is what it was.
 
-mod band;
 mod bend;
 mod fair;
 mod follow;
@@ -20,12 +19,13 @@ mod window;
 
 use nalgebra::Point3;
 use nullsweep_robot::Tool;
+use nullsweep_surface::Scan;
 use rayon::prelude::*;
 
 use self::fair::Fair;
 use self::piece::Piece;
 use crate::plan::{Plan, PlanKnot};
-use crate::sweep::{Sight, coverage};
+use crate::sweep::{contact_motion, coverage};
 use crate::timing::Limits;
 use crate::workcell::{Bed, Workcell};
 
@@ -41,11 +41,9 @@ const GUARDED: usize = 12;
 #[derive(Clone, Copy)]
 pub struct Keep<'a> {
     /// The scanned points, in the root frame.
-    pub sight: Sight<'a>,
+    pub scan: &'a Scan,
     /// Which of them count.
     pub points: &'a [bool],
-    /// What the tool goes at: a nozzle lays on by it. \[m/s\]
-    pub speed: f64,
 }
 
 /// The plan (which must be of bang-bang velocity) with fair contact pieces, proven free of
@@ -168,7 +166,7 @@ fn guard(pieces: &mut [Fair], lost: &[Point3<f64>], wanted: usize, tool: &Tool) 
 
 impl Keep<'_> {
     fn swept(&self, plan: &Plan, cell: Workcell<'_>) -> Vec<bool> {
-        coverage::done_by(self.sight, plan.trajectory(), cell.arm, self.speed)
+        coverage::swept(self.scan, &contact_motion(plan.trajectory(), cell.arm), cell.tool)
     }
 
     /// Of the points to sweep, and of all.
@@ -179,7 +177,7 @@ impl Keep<'_> {
 
     fn lost(&self, before: &[bool], after: &[bool]) -> Vec<Point3<f64>> {
         let lost = (0..after.len()).filter(|&i| before[i] && !after[i]);
-        lost.map(|i| self.sight.scan.points[i]).collect()
+        lost.map(|i| self.scan.points[i]).collect()
     }
 }
 

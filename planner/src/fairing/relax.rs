@@ -12,12 +12,12 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 use nullsweep_robot::{Jacobian, JointVector};
 use rayon::prelude::*;
 
-use super::band::Band;
 use super::bend::{Bend, Offset};
 use super::follow::onto;
 use super::guard::Guard;
 use super::piece::{Laid, Mean, Piece};
 use super::window::Windows;
+use crate::band::Band;
 use crate::timing::{Limits, arrivals};
 use crate::workcell::{Bed, Workcell};
 

@@ -150,7 +150,7 @@ fn moved(of: &Planning<'_>, mut plan: Plan, rest: Option<&Rest>, clock: &mut Clo
     // and what is worked on from afar lies elsewhere than the tool.
     if job.smooth && job.tool.touches() && !job.tool.rolls() {
         progress.stage("fairing", None);
-        let keep = Keep { sight: of.sight, points: of.to_sweep, speed: job.working_speed() };
+        let keep = Keep { scan: of.scan, points: of.to_sweep };
         let limits = job.profile.is_curved().then(|| Limits::of(cell.arm, job.v_max));
         plan = clock.time("fairing", || fair(&plan, cell, of.bed, keep, limits.as_ref()));
         timing::set_times(&mut plan.knots, &of.velocity);

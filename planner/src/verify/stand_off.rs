@@ -163,6 +163,7 @@ mod tests {
             (0.335, 0.0, None),
             (0.245, 0.0, None),
             (0.265, 0.0, None),
+            (0.36, 0.0, None),
             (0.3, 0.55, Some("0.55 rad from its normal")),
         ] {
             let (_, violations) = looked(distance, tilt);

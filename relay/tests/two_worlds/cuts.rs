@@ -188,7 +188,7 @@ pub(crate) fn every_plan_has_one_outcome(road: &dyn Road) {
     admitted.sort_by(f64::total_cmp);
     let (segments, lost) = road.lost();
     println!(
-        "{PLANS} plans, {segments} segments, {lost} lost ({:.1} %), 3 cuts of 3 s: {finished} finished, \
+        "{PLANS} plans, {segments} segments or packets, {lost} lost ({:.1} %), 3 cuts of 3 s: {finished} finished, \
          {refused} refused, each once; admission after {:.2} s in the median, {:.2} s at most; ends \
          {longest:.3} s late at most; worst step {:.2} of v·T in {} setpoints",
         1e2 * lost as f64 / segments as f64,

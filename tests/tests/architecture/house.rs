@@ -142,6 +142,7 @@ const PLANNER: &[(&str, &[&str])] = &[
     // 0
     ("progress", &[]),
     ("cost", &[]),
+    ("band", &[]),
     ("regions", &[]),
     ("cover", &[]),
     // 1
@@ -154,8 +155,8 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("tour", BELOW_3),
     ("motion", BELOW_3),
     // Ways are bent for the time that they take.
-    ("fairing", &["progress", "cost", "workcell", "plan", "roadmap", "sweep", "timing"]),
-    ("timing", BELOW_3),
+    ("fairing", &["progress", "cost", "band", "workcell", "plan", "roadmap", "sweep", "timing"]),
+    ("timing", &["progress", "cost", "band", "workcell", "plan", "roadmap", "sweep"]),
     ("verify", &["progress", "cost", "regions", "workcell", "plan", "sweep"]),
     ("link", BELOW_3),
     // given poses: what those who go through them share

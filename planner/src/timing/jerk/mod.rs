@@ -8,7 +8,6 @@
 //! without acceleration, and whose jerk between two knots is the control points' third difference
 //! ([`spline`]): what the executor follows, exactly, from positions and velocities.
 
-mod banded;
 mod pacing;
 mod reference;
 mod spline;

@@ -11,7 +11,7 @@
 use nullsweep_robot::{JointVector, MAX_DOF};
 
 use super::super::Limits;
-use super::banded::Banded;
+use crate::band::Band;
 
 /// A grid point of the reference.
 #[derive(Clone, Copy, Debug)]
@@ -161,7 +161,7 @@ impl Problem {
     /// One step of Newton's method; whether another may help.
     fn improve(&self, b: &mut [f64], mu: f64) -> bool {
         let n = b.len();
-        let mut hessian = Banded::zero(n);
+        let mut hessian = Band::zero(n, 3);
         let mut fall = vec![0.0; n];
         let h = self.step;
         for k in 0..n {
@@ -207,7 +207,7 @@ impl Problem {
                 for l in i..3 {
                     let (row, column) = (index(i), index(l));
                     let twice = if i != l && row == column { 2.0 } else { 1.0 };
-                    hessian.add(row, column - row, twice * bend[i][l]);
+                    hessian.add(row, column, twice * bend[i][l]);
                 }
             }
         }

@@ -2,25 +2,25 @@
 
 /// A symmetric, positive definite matrix: row by row the diagonal and what stands to its right, as far
 /// as the band goes.
-pub(super) struct Band {
+pub(crate) struct Band {
     width: usize,
     entries: Vec<f64>,
 }
 
 impl Band {
     /// All zero. `width`: how many entries of a row there are, the diagonal's included.
-    pub(super) fn zero(size: usize, width: usize) -> Self {
+    pub(crate) fn zero(size: usize, width: usize) -> Self {
         Self { width, entries: vec![0.0; size * width] }
     }
 
     /// Adds to an entry at or right of the diagonal, within the band.
     #[inline]
-    pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
+    pub(crate) fn add(&mut self, row: usize, column: usize, value: f64) {
         self.entries[row * self.width + column - row] += value;
     }
 
     /// Solves in place by L D Lᵀ; the right side becomes the solution.
-    pub(super) fn solve(mut self, x: &mut [f64]) {
+    pub(crate) fn solve(mut self, x: &mut [f64]) {
         let (n, width) = (x.len(), self.width);
         for i in 0..n {
             let reach = width.min(n - i);
@@ -42,8 +42,8 @@ impl Band {
         }
         for i in (0..n).rev() {
             let row = &self.entries[i * width..][..width.min(n - i)];
-            let known: f64 = row[1..].iter().zip(&x[i + 1..]).map(|(l, x)| l * x).sum();
-            x[i] = x[i] / row[0] - known;
+            let known = row[1..].iter().zip(&x[i + 1..]).map(|(l, x)| l * x);
+            x[i] = known.fold(x[i] / row[0], |own, known| own - known);
         }
     }
 }
