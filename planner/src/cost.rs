@@ -107,7 +107,7 @@ mod tests {
     }
 
     fn check(cost: &impl Cost) {
-        let at = |j: usize, k: usize| (1.7 * (j * 8 + k) as f64).sin().abs();
+        let at = |j: usize, k: usize| libm::sin(1.7 * (j * 8 + k) as f64).abs();
         let lanes = std::array::from_fn(|j| f32x8::from(std::array::from_fn(|k| at(j, k) as f32)));
         for (k, found) in cost.of_eight(&lanes).to_array().into_iter().enumerate() {
             let expected = cost.of(&JointVector::from_fn(|j| at(j, k)));

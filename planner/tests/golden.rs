@@ -21,32 +21,6 @@ use nullsweep_surface::{
     CleanConfig, CropBox, Placement, place, simulate, simulate::SimulatedView,
 };
 
-/// What the digests below were taken with: see [`rounding`].
-const ROUNDING: u64 = 0x4c02_b0fa_2b1f_2259;
-
-/// How this machine's mathematical functions round their last bit, which plans depend on: a hash
-/// of some thousand of their values.
-fn rounding() -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    for k in 0..4000 {
-        let x = f64::from(k) * 0.001_7 - 3.4;
-        let unit = x / 3.5;
-        for value in [x.sin(), x.cos(), x.tan(), unit.acos(), x.atan2(unit), x.hypot(unit)] {
-            hash = (hash ^ value.to_bits()).wrapping_mul(0x0100_0000_01b3);
-        }
-    }
-    hash
-}
-
-/// Whether digests can be compared here; says so where they cannot.
-fn comparable() -> bool {
-    let same = rounding() == ROUNDING;
-    if !same {
-        println!("skipped: sine and its like round otherwise here ({:#x})", rounding());
-    }
-    same
-}
-
 fn assert_golden(found: &[(String, u64)], golden: &[(&str, u64)]) {
     let found: Vec<(&str, u64)> = found.iter().map(|(name, d)| (name.as_str(), *d)).collect();
     let rows: String =
@@ -93,95 +67,84 @@ fn digests(scene: &Scene, job: &Job) -> Vec<(String, u64)> {
 
 #[test]
 fn the_seat_is_planned_as_ever() {
-    if comparable() {
-        let seat = scene(&simulate::chair(1), Some(simulate::chair_seat()));
-        let found = digests(&seat, &job([-0.708, -0.004, 1.047], 0.2));
-        assert_golden(
-            &found,
-            &[
-                ("tsp velocity", 0x1f7684da5d813f81),
-                ("tsp acceleration", 0x1cca7899545752ab),
-                ("curvature velocity", 0xeb02fc0e6f0c1fbf),
-                ("curvature acceleration", 0xa2875ba47c027799),
-                ("joint velocity", 0xbc3347081f8d4a2f),
-                ("joint acceleration", 0x05c89a1989cccd4e),
-            ],
-        );
-    }
+    let seat = scene(&simulate::chair(1), Some(simulate::chair_seat()));
+    let found = digests(&seat, &job([-0.708, -0.004, 1.047], 0.2));
+    assert_golden(
+        &found,
+        &[
+            ("tsp velocity", 0x1f7684da5d813f81),
+            ("tsp acceleration", 0x1cca7899545752ab),
+            ("curvature velocity", 0xeb02fc0e6f0c1fbf),
+            ("curvature acceleration", 0xa2875ba47c027799),
+            ("joint velocity", 0xbc3347081f8d4a2f),
+            ("joint acceleration", 0x05c89a1989cccd4e),
+        ],
+    );
 }
 
 #[test]
 fn the_chair_is_planned_as_ever() {
-    if comparable() {
-        let chair = scene(&simulate::chair(1), None);
-        let found = digests(&chair, &job([-0.737, 0.158, 0.851], 0.1));
-        assert_golden(
-            &found,
-            &[
-                ("tsp velocity", 0x531c66d8c8692a73),
-                ("tsp acceleration", 0x243fe27e92d3caf6),
-                ("curvature velocity", 0xc500d90e942bb1e7),
-                ("curvature acceleration", 0x2871a17296c80a4f),
-                ("joint velocity", 0x7b0439ac88f7e939),
-                ("joint acceleration", 0xce1c665e9e9f976a),
-            ],
-        );
-    }
+    let chair = scene(&simulate::chair(1), None);
+    let found = digests(&chair, &job([-0.737, 0.158, 0.851], 0.1));
+    assert_golden(
+        &found,
+        &[
+            ("tsp velocity", 0x531c66d8c8692a73),
+            ("tsp acceleration", 0x243fe27e92d3caf6),
+            ("curvature velocity", 0xc500d90e942bb1e7),
+            ("curvature acceleration", 0x2871a17296c80a4f),
+            ("joint velocity", 0x7b0439ac88f7e939),
+            ("joint acceleration", 0xce1c665e9e9f976a),
+        ],
+    );
 }
 
 #[test]
 fn the_car_is_planned_as_ever() {
-    if comparable() {
-        let car = scene(&simulate::bobby_car(1), None);
-        let found = digests(&car, &job([-0.825, 0.021, 1.047], 0.02));
-        assert_golden(
-            &found,
-            &[
-                ("tsp velocity", 0x15fe1a7f0a0d6215),
-                ("tsp acceleration", 0x215fffde2fce3f15),
-                ("curvature velocity", 0x082fbe542db25a3c),
-                ("curvature acceleration", 0x093265939fc918f6),
-                ("joint velocity", 0x94c32408d51827b4),
-                ("joint acceleration", 0xd6a9949cca7e6a64),
-            ],
-        );
-    }
+    let car = scene(&simulate::bobby_car(1), None);
+    let found = digests(&car, &job([-0.825, 0.021, 1.047], 0.02));
+    assert_golden(
+        &found,
+        &[
+            ("tsp velocity", 0x15fe1a7f0a0d6215),
+            ("tsp acceleration", 0x215fffde2fce3f15),
+            ("curvature velocity", 0x082fbe542db25a3c),
+            ("curvature acceleration", 0x093265939fc918f6),
+            ("joint velocity", 0x94c32408d51827b4),
+            ("joint acceleration", 0xd6a9949cca7e6a64),
+        ],
+    );
 }
 
 /// A stance is searched for, by another cost, for the other arm.
 #[test]
 fn a_stance_is_chosen_as_ever() {
-    if comparable() {
-        let seat = scene(&simulate::chair(1), Some(simulate::chair_seat()));
-        let robot = Robot::pr2();
-        let spec = ArmSpec::pr2(Side::Left);
-        let arm = robot.arm(&spec).expect("an arm");
-        let tool = Tool::default();
-        let search = nullsweep_planner::workcell::stance::StanceSearch {
-            bearings: 8,
-            finalists: 4,
-            ..nullsweep_planner::workcell::stance::StanceSearch::of(&robot, &arm, &tool)
-        };
-        let job = Job {
-            arm: spec,
-            stance: StanceChoice::Search(search),
-            cost: CostKind::Effort,
-            refinements: 0,
-            ..job([0.0; 3], 0.0)
-        };
-        let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
-        assert_golden(
-            &[("left arm".into(), outcome.plan.digest().expect("short enough"))],
-            &[("left arm", 0xf92d806f8b154b55)],
-        );
-    }
+    let seat = scene(&simulate::chair(1), Some(simulate::chair_seat()));
+    let robot = Robot::pr2();
+    let spec = ArmSpec::pr2(Side::Left);
+    let arm = robot.arm(&spec).expect("an arm");
+    let tool = Tool::default();
+    let search = nullsweep_planner::workcell::stance::StanceSearch {
+        bearings: 8,
+        finalists: 4,
+        ..nullsweep_planner::workcell::stance::StanceSearch::of(&robot, &arm, &tool)
+    };
+    let job = Job {
+        arm: spec,
+        stance: StanceChoice::Search(search),
+        cost: CostKind::Effort,
+        refinements: 0,
+        ..job([0.0; 3], 0.0)
+    };
+    let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
+    assert_golden(
+        &[("left arm".into(), outcome.plan.digest().expect("short enough"))],
+        &[("left arm", 0xf92d806f8b154b55)],
+    );
 }
 
 #[test]
 fn given_poses_are_planned_as_ever() {
-    if !comparable() {
-        return;
-    }
     let setup = common::setup(Tolerance([0.02, 0.02, 0.0, 0.0, 0.0, f64::INFINITY]));
     let config = TaskConfig { setup, rounds: 2, trials: 10 };
     let outcome = task::run(
@@ -207,28 +170,25 @@ fn another_arm_is_planned_as_ever() {
         println!("skipped: {} is not there", urdf.display());
         return;
     }
-    if comparable() {
-        let robot = Robot::from_urdf_file(urdf).expect("a robot");
-        let tool =
-            Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/tools/flange-sponge.toml"));
-        let tool = std::fs::read_to_string(tool).expect("a tool");
-        let seat = scene(&simulate::chair(1), Some(simulate::chair_seat()));
-        let job = Job {
-            arm: ArmSpec { base: "panda_link0".into(), tip: "panda_link8".into() },
-            tool: toml::from_str(&tool).expect("a tool"),
-            stance: StanceChoice::Given(Stance {
-                base: [-0.5, 0.0, 0.0],
-                height: 0.0,
-                held: Vec::new(),
-            }),
-            collision: Options { fit_capsules: Some(0.05), ..Options::default() },
-            refinements: 0,
-            ..job([0.0; 3], 0.0)
-        };
-        let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
-        assert_golden(
-            &[("panda".into(), outcome.plan.digest().expect("short enough"))],
-            &[("panda", 0xe78328c544996d84)],
-        );
-    }
+    let robot = Robot::from_urdf_file(urdf).expect("a robot");
+    let tool = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/tools/flange-sponge.toml"));
+    let tool = std::fs::read_to_string(tool).expect("a tool");
+    let seat = scene(&simulate::chair(1), Some(simulate::chair_seat()));
+    let job = Job {
+        arm: ArmSpec { base: "panda_link0".into(), tip: "panda_link8".into() },
+        tool: toml::from_str(&tool).expect("a tool"),
+        stance: StanceChoice::Given(Stance {
+            base: [-0.5, 0.0, 0.0],
+            height: 0.0,
+            held: Vec::new(),
+        }),
+        collision: Options { fit_capsules: Some(0.05), ..Options::default() },
+        refinements: 0,
+        ..job([0.0; 3], 0.0)
+    };
+    let outcome = run(&robot, &seat, &job, &Silent).expect("a plan");
+    assert_golden(
+        &[("panda".into(), outcome.plan.digest().expect("short enough"))],
+        &[("panda", 0xe78328c544996d84)],
+    );
 }

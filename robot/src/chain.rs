@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, SMatrix, UnitQuaternion, Vector3};
 use wide::f64x4;
 
-use crate::{JointVector, MAX_DOF};
+use crate::{JointVector, MAX_DOF, lanes};
 
 /// Geometric Jacobian: rows linear x, y, z [m/s], angular x, y, z [rad/s] of the tip in the root
 /// frame; one column a joint, unused columns zero.
@@ -146,8 +146,8 @@ impl HalfSines {
 #[inline]
 fn half_sines(q: &JointVector) -> HalfSines {
     let [a, b, c, d, e, f, g, h] = **q;
-    let (s0, c0) = (f64x4::new([a, b, c, d]) * 0.5).sin_cos();
-    let (s1, c1) = (f64x4::new([e, f, g, h]) * 0.5).sin_cos();
+    let (s0, c0) = lanes::sin_cos(f64x4::new([a, b, c, d]) * 0.5);
+    let (s1, c1) = lanes::sin_cos(f64x4::new([e, f, g, h]) * 0.5);
     let join = |one: f64x4, two: f64x4| {
         let ([a, b, c, d], [e, f, g, h]) = (one.to_array(), two.to_array());
         [a, b, c, d, e, f, g, h]
@@ -158,6 +158,6 @@ fn half_sines(q: &JointVector) -> HalfSines {
 /// Rotation about a unit axis. \[rad\]
 #[inline]
 pub(crate) fn about(axis: &Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
-    let (sin, cos) = (0.5 * angle).sin_cos();
+    let (sin, cos) = libm::sincos(0.5 * angle);
     UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, axis * sin))
 }

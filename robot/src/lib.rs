@@ -12,7 +12,8 @@
 //! ```
 //!
 //! Read the modules in this order, from the bottom: `urdf` (text to tree), `limits` (soft limits
-//! and the braking margin that planner and executor share), `joints` (joint vectors), `chain`
+//! and the braking margin that planner and executor share), `joints` (joint vectors), `lanes`
+//! (elementary functions of four numbers at once), `chain`
 //! (serial chain, poses, Jacobian), `ik` (closed forms for arms of known shapes, numeric for all
 //! others), `arm` (tree and [`ArmSpec`] to chain and solvers). `fingerprint` names a robot and arm
 //! in 64 bits so that a plan reaches only the robot it was made for. `pr2` is the PR2's own
@@ -26,6 +27,7 @@ mod chain;
 mod fingerprint;
 mod ik;
 mod joints;
+mod lanes;
 mod limits;
 mod named;
 mod pr2;

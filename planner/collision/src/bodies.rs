@@ -53,7 +53,7 @@ impl Body {
             let slide = self.rest.rotation * (self.axis * value);
             return Frame { translation: self.rest.translation + slide, ..self.rest };
         }
-        let (sine, cosine) = value.sin_cos();
+        let (sine, cosine) = libm::sincos(value);
         let turned = self.turned[0] * sine + self.turned[1] * (1.0 - cosine);
         Frame { rotation: self.rest.rotation + turned, ..self.rest }
     }

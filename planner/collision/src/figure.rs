@@ -225,7 +225,7 @@ mod tests {
             let pad = figure.shapes.last().unwrap();
             let front = tool.on(&arm).centre(&q);
             let nearest = pad.mesh.vertices.iter().map(|v| (poses[body] * v - front).norm());
-            let corner = 0.5 * tool.width.hypot(tool.length);
+            let corner = 0.5 * libm::hypot(tool.width, tool.length);
             let nearest = nearest.fold(f64::INFINITY, f64::min);
             assert!(pad.is_pad && (nearest - corner).abs() < 1e-9, "{nearest}");
         }

@@ -172,7 +172,7 @@ impl Solid {
         match self {
             Self::Ball { radius } => *radius,
             Self::Capsule { half, radius } => half + radius,
-            Self::Cylinder { half, radius } => half.hypot(*radius),
+            Self::Cylinder { half, radius } => libm::hypot(*half, *radius),
             Self::Box { half } => half.norm(),
             Self::Hull(hull) => {
                 let centre = 0.5 * (hull.min + hull.max);

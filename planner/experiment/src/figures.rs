@@ -286,7 +286,7 @@ fn label(method: Method) -> &'static str {
 
 /// The least of 1, 2, 5 · 10^k that is not below a value.
 fn nice(value: f64) -> f64 {
-    let power = 10f64.powf(value.log10().floor());
+    let power = libm::pow(10f64, libm::log10(value).floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&v| v >= value).unwrap_or(value)
 }
 

@@ -139,14 +139,15 @@ pub(super) fn iterate(
             if stop() {
                 break;
             }
-            temperature =
-                cooling.from * table.typical * ratio.powf(made as f64 / cooling.trials as f64);
+            temperature = cooling.from
+                * table.typical
+                * libm::pow(ratio, made as f64 / cooling.trials as f64);
         }
         made += 1;
         kick(table, local, tour, rng);
         local.run(table, tour);
         let u: f64 = rng.random_range(f64::MIN_POSITIVE..1.0);
-        let allowed = kept.cost + (-u.ln() * temperature) as i64;
+        let allowed = kept.cost + (-libm::log(u) * temperature) as i64;
         if tour.cost <= allowed {
             kept.copy_from(tour);
             if tour.cost < best.cost {

@@ -85,7 +85,7 @@ fn scattered(clusters: usize, spread: f64, seed: u64) -> Instance {
         let centre = [0; 2].map(|_| rng.random_range(0.0..500.0));
         points.extend((0..size).map(|_| centre.map(|c| c + spread * rng.random_range(-1.0..1.0))));
     }
-    let between = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+    let between = |p: [f64; 2], q: [f64; 2]| libm::hypot(p[0] - q[0], p[1] - q[1]);
     let costs = points.iter().flat_map(|&p| points.iter().map(move |&q| between(p, q))).collect();
     Instance::new(&sizes, Costs::Dense(costs), Jump::Forbidden, Ends::Closed)
         .expect("the parts fit")
@@ -294,7 +294,7 @@ fn many_clusters_are_solved_by_near_arcs() {
     let at = move |c: usize| [(c % side) as f64, (c / side) as f64];
     let cost = move |a: usize, i: usize, b: usize, j: usize| {
         let (p, q) = (at(a), at(b));
-        (p[0] - q[0]).hypot(p[1] - q[1]) + (i + j) as f64
+        libm::hypot(p[0] - q[0], p[1] - q[1]) + (i + j) as f64
     };
     let costs = Costs::OnDemand(OnDemand { neighbours: None, cost: std::sync::Arc::new(cost) });
     let sizes = vec![2; side * side];
@@ -315,11 +315,11 @@ fn costs_on_demand_equal_stored_ones() {
     let sizes = vec![4; 30];
     let point = |a: usize, i: usize| {
         let k = (a * 4 + i) as f64;
-        [(k * 0.7).sin() * 10.0, (k * 1.3).cos() * 10.0]
+        [libm::sin(k * 0.7) * 10.0, libm::cos(k * 1.3) * 10.0]
     };
     let cost = move |a: usize, i: usize, b: usize, j: usize| {
         let (p, q) = (point(a, i), point(b, j));
-        (p[0] - q[0]).hypot(p[1] - q[1])
+        libm::hypot(p[0] - q[0], p[1] - q[1])
     };
     let n = 120;
     let matrix: Vec<f64> =

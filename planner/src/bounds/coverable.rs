@@ -66,8 +66,8 @@ pub fn coverable(
 fn poses(cell: Workcell<'_>, bed: &Bed, foot: &SurfacePoint) -> Vec<(Isometry3<f64>, f64)> {
     let SurfacePoint { point: centre, normal } = *foot;
     let tilted = (0..ASIDE).map(|k| {
-        let aside = direction(&normal, TAU * k as f64 / ASIDE as f64) * TILT.sin();
-        UnitVector3::new_normalize(normal.scale(TILT.cos()) + aside)
+        let aside = direction(&normal, TAU * k as f64 / ASIDE as f64) * libm::sin(TILT);
+        UnitVector3::new_normalize(normal.scale(libm::cos(TILT)) + aside)
     });
     let laid = std::iter::once(normal)
         .chain(tilted)

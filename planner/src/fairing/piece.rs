@@ -152,7 +152,7 @@ impl Piece {
         let mut at = vec![0.0];
         for pair in states.windows(2) {
             let turning = TURNING * pair[0].q.distance(&pair[1].q);
-            let step = (pair[1].centre - pair[0].centre).norm().hypot(turning);
+            let step = libm::hypot((pair[1].centre - pair[0].centre).norm(), turning);
             at.push(at[at.len() - 1] + step);
         }
         let length = at[at.len() - 1];

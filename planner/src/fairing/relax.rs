@@ -257,13 +257,14 @@ impl Relaxation<'_> {
             if bounds[of][j] > 0.0 { rate / bounds[of][j] } else { 0.0 }
         };
         let shares: [Vec<f64>; 2] = [0, 1].map(|of| (0..dof).map(|j| share(of, j)).collect());
-        let all: f64 = shares.iter().flatten().map(|s| s.abs().powf(POWER)).sum();
+        let all: f64 = shares.iter().flatten().map(|s| libm::pow(s.abs(), POWER)).sum();
         // Time goes with the velocity, and with the root of the acceleration.
         for (of, worth) in [(0, 0.5), (1, 0.25)] {
             for j in 0..dof {
                 let share = shares[of][j];
                 let bound = bounds[of][j];
-                let weight = 0.5 * both * worth * share.abs().powf(POWER - 2.0) / all.max(1e-9);
+                let weight =
+                    0.5 * both * worth * libm::pow(share.abs(), POWER - 2.0) / all.max(1e-9);
                 if weight < 1e-9 || bound <= 0.0 {
                     continue;
                 }

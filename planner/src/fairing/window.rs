@@ -107,7 +107,7 @@ impl Shares {
         match self.share(u) * width {
             0.0 => 0.0,
             _ if room == 0.0 => 0.0,
-            wide => wide * room / (wide.powi(4) + room.powi(4)).powf(0.25),
+            wide => wide * room / libm::pow(wide.powi(4) + room.powi(4), 0.25),
         }
     }
 

@@ -225,8 +225,8 @@ impl<'p, C: Cost> Completion<'p, C> {
         });
         let around = feet.flat_map(|SurfacePoint { point: centre, normal }| {
             let tilted = (0..ASIDE).map(move |k| {
-                let aside = direction(&normal, turn(k)) * TILT.sin();
-                UnitVector3::new_normalize(normal.scale(TILT.cos()) + aside)
+                let aside = direction(&normal, turn(k)) * libm::sin(TILT);
+                UnitVector3::new_normalize(normal.scale(libm::cos(TILT)) + aside)
             });
             let normals = std::iter::once(normal).chain(tilted);
             normals.filter_map(move |normal| bed.laid(Patch { centre, normal, ..patch.clone() }))

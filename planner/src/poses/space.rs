@@ -211,14 +211,14 @@ impl<'a> Space<'a> {
 fn deviation(pose: &Isometry3<f64>, tool: &Isometry3<f64>) -> [f64; 6] {
     let off = pose.inverse() * tool;
     let axis = off.rotation * Vector3::z();
-    let sine = axis.x.hypot(axis.y);
-    let tilt = sine.atan2(axis.z);
+    let sine = libm::hypot(axis.x, axis.y);
+    let tilt = libm::atan2(sine, axis.z);
     // The tilt turns z into the axis, about z × axis; half a turn goes about any axis.
     let (share, x) = match sine > 1e-12 {
         true => (tilt / sine, -axis.y),
         false => (1.0, tilt),
     };
-    let turn = 2.0 * off.rotation.k.atan2(off.rotation.w);
+    let turn = 2.0 * libm::atan2(off.rotation.k, off.rotation.w);
     let turn = wrap(turn);
     let t = off.translation.vector;
     [t.x, t.y, t.z, x * share, axis.x * share, turn]

@@ -21,7 +21,7 @@ impl Tolerance {
         let mut met: [f64; 6] = std::array::from_fn(|k| off[k].clamp(-self.0[k], self.0[k]));
         let (rx, ry) = (self.0[3], self.0[4]);
         if rx > 0.0 && ry > 0.0 && rx.is_finite() && ry.is_finite() {
-            let beyond = (off[3] / rx).hypot(off[4] / ry).max(1.0);
+            let beyond = libm::hypot(off[3] / rx, off[4] / ry).max(1.0);
             met[3] = off[3] / beyond;
             met[4] = off[4] / beyond;
         }
@@ -59,7 +59,7 @@ mod tests {
     fn two_tilts_are_a_cone() {
         let cone = Tolerance([0.0, 0.1, f64::INFINITY, 0.2, 0.2, 0.0]);
         let met = cone.nearest(&[1.0, 0.05, 3.0, 0.3, -0.4, 0.1]);
-        let tilt = met[3].hypot(met[4]);
+        let tilt = libm::hypot(met[3], met[4]);
         assert!((tilt - 0.2).abs() < 1e-12 && (met[3] - 0.12).abs() < 1e-12, "{met:?}");
         assert_eq!((met[0], met[1], met[2], met[5]), (0.0, 0.05, 3.0, 0.0));
         // One alone is to either side.

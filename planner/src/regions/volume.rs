@@ -65,7 +65,7 @@ impl Volume {
             Shape::Sphere { radius } => (own.coords.norm() - radius).max(0.0),
             Shape::Prism { outline, low, high } => {
                 let beside = from_polygon(outline, own.x, own.y);
-                beside.hypot((low - own.z).max(own.z - high).max(0.0))
+                libm::hypot(beside, (low - own.z).max(own.z - high).max(0.0))
             }
             Shape::HalfSpace => (-own.z).max(0.0),
             Shape::Marked(marked) => marked.distance(&own),

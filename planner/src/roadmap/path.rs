@@ -65,7 +65,7 @@ impl ToolPath {
         for s in &mut stations {
             let angle = start + swing * s.share;
             s.turn = angle;
-            s.travel = s.travel * angle.cos() + s.normal.cross(&s.travel) * angle.sin();
+            s.travel = s.travel * libm::cos(angle) + s.normal.cross(&s.travel) * libm::sin(angle);
         }
         Self { stations, stand_off }
     }
@@ -105,5 +105,5 @@ impl ToolPath {
 fn turn(station: &Station, heading: f64) -> f64 {
     let d = direction(&station.normal, heading);
     let t = station.travel;
-    station.normal.cross(&t).dot(&d).atan2(t.dot(&d))
+    libm::atan2(station.normal.cross(&t).dot(&d), t.dot(&d))
 }

@@ -71,7 +71,7 @@ impl Floor {
         let things = Grid::new(&flat, CLEAR);
         let mut floor = Self { low, size, taken: vec![false; size[0] * size[1]] };
         let at_stop = |p: &Point3<f64>| {
-            stops.iter().any(|s| (s.base[0] - p.x).hypot(s.base[1] - p.y) <= AT_STOP)
+            stops.iter().any(|s| libm::hypot(s.base[0] - p.x, s.base[1] - p.y) <= AT_STOP)
         };
         for square in 0..floor.taken.len() {
             let middle = floor.middle(square);
@@ -123,7 +123,7 @@ impl Floor {
             }
         }
         let straight =
-            |stop: &Stance| (stop.base[0] - from.base[0]).hypot(stop.base[1] - from.base[1]);
+            |stop: &Stance| libm::hypot(stop.base[0] - from.base[0], stop.base[1] - from.base[1]);
         let length = |stop: &Stance| match best[self.square(stop)] {
             u64::MAX => straight(stop),
             found => (found as f64 / UNIT).max(straight(stop)),

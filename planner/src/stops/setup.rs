@@ -76,7 +76,7 @@ impl Setup {
     pub(super) fn around(&self, robot: &Robot, limbs: &[Limb]) -> f64 {
         let far = |limb: &Limb| {
             let pivot = self.pivot(robot, &limb.arm);
-            pivot.x.hypot(pivot.y) + limb.reach + AROUND
+            libm::hypot(pivot.x, pivot.y) + limb.reach + AROUND
         };
         limbs.iter().map(far).fold(0.0, f64::max)
     }

@@ -69,7 +69,8 @@ fn why(of: &Rounds<'_>, patch: usize) -> Result<String, StopsError> {
     let patch = &of.patches[patch];
     let limbs = of.setup.limbs(of.robot)?;
     let outside = patch.centre + patch.normal.into_inner() * BEFORE;
-    let apart = |stance: &Stance| (stance.base[0] - outside.x).hypot(stance.base[1] - outside.y);
+    let apart =
+        |stance: &Stance| libm::hypot(stance.base[0] - outside.x, stance.base[1] - outside.y);
     let made = of.made();
     let Some(stance) = made.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))) else {
         return Ok("no stop".into());

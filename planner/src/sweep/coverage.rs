@@ -38,7 +38,7 @@ pub fn sweeps(scan: &Scan, point: u32, patch: &Patch, tool: &Tool) -> bool {
     let beside = (offset.norm_squared() - height * height).max(0.0).sqrt();
     beside <= tool.inner_radius()
         && height.abs() <= tool.reach_normal
-        && normal.dot(&patch.normal) >= tool.reach_angle.cos()
+        && normal.dot(&patch.normal) >= libm::cos(tool.reach_angle)
 }
 
 /// For each point of the scan whether the tool has worked on it in one of the motions, see [`swept`];
@@ -108,11 +108,11 @@ mod tests {
     fn what_counts_as_swept_at_any_heading_is_swept_at_any() {
         // Waves of 6 mm, a point every 4 mm.
         let at = |n: i32| 0.004 * f64::from(n) - 0.2;
-        let height = |x: f64| 0.006 * (x / 0.02).sin();
+        let height = |x: f64| 0.006 * libm::sin(x / 0.02);
         let points: Vec<Point3<f64>> = (0..10_000)
             .map(|i| Point3::new(at(i % 100), at(i / 100), height(at(i % 100))))
             .collect();
-        let slope = |p: &Point3<f64>| Vector3::new(-0.3 * (p.x / 0.02).cos(), 0.0, 1.0);
+        let slope = |p: &Point3<f64>| Vector3::new(-0.3 * libm::cos(p.x / 0.02), 0.0, 1.0);
         let normals = points.iter().map(|p| UnitVector3::new_normalize(slope(p))).collect();
         let scan = Scan { raw: points.clone(), points, normals, spacing: 0.004 };
         let tool = Tool::default();

@@ -94,7 +94,7 @@ pub fn missed<'a>(
     left.no_motion.iter().for_each(|&i| why[i as usize] = Missed::NoMotion);
     for motion in motions {
         let tool = motion.tool;
-        let reach = tool.outer_radius().hypot(OVER.max(tool.reach_normal));
+        let reach = libm::hypot(tool.outer_radius(), OVER.max(tool.reach_normal));
         let grid = Grid::new(&scan.points, 0.5 * reach);
         let strokes = contact_motion(motion, arm).into_iter().map(|pose| (pose, false));
         let mounted = tool.on(arm);
@@ -110,7 +110,7 @@ pub fn missed<'a>(
                     return;
                 }
                 let near = offset.dot(&z).abs() <= tool.reach_normal;
-                let facing = -scan.normals[i].dot(&z) >= tool.reach_angle.cos();
+                let facing = -scan.normals[i].dot(&z) >= libm::cos(tool.reach_angle);
                 let now = match (near, facing, tool.footprint) {
                     (true, true, _) if is_touch => Missed::Touched,
                     (true, true, Footprint::Nozzle(_)) => Missed::Deposit,
@@ -155,7 +155,7 @@ mod tests {
         // In the contact frame, z into the surface, seen from what the pad works on.
         let at = |x: f64, y: f64, z: f64| pose * Point3::new(x, y, z + tool.stand_off);
         let facing = |tilt: f64| {
-            UnitVector3::new_normalize(pose * Vector3::new(tilt.sin(), 0.0, -tilt.cos()))
+            UnitVector3::new_normalize(pose * Vector3::new(libm::sin(tilt), 0.0, -libm::cos(tilt)))
         };
         let rows = [
             (at(0.0, 0.0, 0.0), 0.0),

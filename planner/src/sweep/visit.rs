@@ -53,9 +53,9 @@ fn visit_touched(
     tool: &Tool,
     mut visit: impl FnMut(usize, usize),
 ) {
-    let reach = tool.outer_radius().hypot(tool.reach_normal);
+    let reach = libm::hypot(tool.outer_radius(), tool.reach_normal);
     let grid = Grid::new(&scan.points, 0.5 * reach);
-    let aligned = tool.reach_angle.cos();
+    let aligned = libm::cos(tool.reach_angle);
     for (at, pose) in contact_poses.iter().enumerate() {
         let [x, y, z] = [0, 1, 2].map(|axis| pose.rotation * Vector3::ith_axis(axis));
         let centre = Point3::from(pose.translation.vector + z.scale(tool.stand_off));
@@ -81,9 +81,9 @@ fn visit_seen(
     let Sight { scan, beside, solids } = sight;
     let all: Vec<Point3<f64>> = scan.points.iter().chain(beside).copied().collect();
     let ([_, far], slopes) = (tool.distance(), tool.slopes());
-    let reach = (0.5 * far).hypot(far * slopes[0].hypot(slopes[1]));
+    let reach = libm::hypot(0.5 * far, far * libm::hypot(slopes[0], slopes[1]));
     let grid = Grid::new(&all, 0.25 * reach);
-    let aligned = tool.reach_angle.cos();
+    let aligned = libm::cos(tool.reach_angle);
     let mut found: Vec<(usize, Point3<f64>)> = Vec::new();
     for (at, pose) in contact_poses.iter().enumerate() {
         let back = pose.inverse();

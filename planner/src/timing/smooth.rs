@@ -147,7 +147,7 @@ mod tests {
         let points: Vec<JointVector> = (0..20)
             .map(|k| {
                 let angle = 0.1 * f64::from(k);
-                at(angle.cos(), angle.sin())
+                at(libm::cos(angle), libm::sin(angle))
             })
             .collect();
         let runs = smooth(&points, &|_, _| true);

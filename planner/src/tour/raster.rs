@@ -57,7 +57,7 @@ impl Face {
     #[must_use]
     pub fn all(scan: &Scan, patches: &[Patch], marked: &[bool], neighbour: f64) -> Vec<Self> {
         let mut open: Vec<bool> = marked.to_vec();
-        let alike = |a: &UnitVector3<f64>, b: &UnitVector3<f64>| a.dot(b) >= BENT.cos();
+        let alike = |a: &UnitVector3<f64>, b: &UnitVector3<f64>| a.dot(b) >= libm::cos(BENT);
         let near = |a: &Patch, b: &Patch| (a.centre - b.centre).norm() <= neighbour;
         let mut faces = Vec::new();
         loop {
@@ -68,7 +68,7 @@ impl Face {
                     .filter(|&k| {
                         let apart = (patches[k].centre - patches[i].centre).norm();
                         apart <= 2.0 * neighbour
-                            && patches[k].normal.dot(&patches[i].normal) >= (0.5 * BENT).cos()
+                            && patches[k].normal.dot(&patches[i].normal) >= libm::cos(0.5 * BENT)
                     })
                     .count()
             };
@@ -128,7 +128,7 @@ impl Face {
     #[must_use]
     pub fn strips(&self, scan: &Scan, bed: &Bed, tool: &Tool, angle: f64) -> Vec<Vec<Place>> {
         let (e1, e2) = tangents(&self.normal);
-        let along = e1 * angle.cos() + e2 * angle.sin();
+        let along = e1 * libm::cos(angle) + e2 * libm::sin(angle);
         let across = self.normal.cross(&along);
         let flat: Vec<Flat> = self
             .points
@@ -191,7 +191,7 @@ impl Face {
         [along, across]: [&Vector3<f64>; 2],
         bed: &Bed,
     ) -> Option<SurfacePoint> {
-        let apart = |p: &&Flat| (p.u - u).hypot(p.v - v);
+        let apart = |p: &&Flat| libm::hypot(p.u - u, p.v - v);
         let nearest = flat.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
         if apart(&nearest) > NEAR {
             return None;

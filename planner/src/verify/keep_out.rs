@@ -21,7 +21,7 @@ pub(super) fn keep_out(plan: &Plan, arm: &Arm, points: &[Point3<f64>]) -> Vec<Vi
     let tool = &plan.tool;
     let z = worked(tool);
     let reach = if tool.touches() {
-        tool.outer_radius().hypot(z[0].abs().max(z[1].abs()))
+        libm::hypot(tool.outer_radius(), z[0].abs().max(z[1].abs()))
     } else {
         tool.farthest()
     };

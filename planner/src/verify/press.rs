@@ -60,7 +60,7 @@ fn contacts(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Vec<Contact
         let axis = pose.rotation * Vector3::z();
         let (mut deepest, mut under, mut touched) = (0.0_f64, 0usize, 0usize);
         let mut nearest = (CENTRE * CENTRE, None);
-        grid.within(&centre, reach.hypot(tool.thickness), |index, point, squared| {
+        grid.within(&centre, libm::hypot(reach, tool.thickness), |index, point, squared| {
             let normal = surface.normals.get(index as usize);
             if normal.is_some() && squared < nearest.0 {
                 nearest = (squared, normal);
@@ -69,12 +69,12 @@ fn contacts(scene: &Scene, poses: &[Isometry3<f64>], tool: &Tool) -> Vec<Contact
             let inside = tool.is_under(p.x, p.y);
             if inside && (-tool.thickness..=UNDER).contains(&p.z) {
                 deepest = deepest.max(-p.z);
-                let faces = normal.is_some_and(|n| -n.dot(&axis) >= tool.reach_angle.cos());
+                let faces = normal.is_some_and(|n| -n.dot(&axis) >= libm::cos(tool.reach_angle));
                 under += usize::from(faces);
                 touched += usize::from(faces && p.z <= tool.hover());
             }
         });
-        let facing = nearest.1.map_or(0.0, |n| (-n.dot(&axis)).clamp(-1.0, 1.0).acos());
+        let facing = nearest.1.map_or(0.0, |n| libm::acos((-n.dot(&axis)).clamp(-1.0, 1.0)));
         Contact { press: deepest, facing, touching: touched as f64 / under.max(1) as f64 }
     };
     poses.par_iter().map(look).collect()

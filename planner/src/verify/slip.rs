@@ -40,7 +40,7 @@ pub(super) fn slip(plan: &Plan, arm: &Arm) -> Vec<Violation> {
             let [ahead, sideways] =
                 [Vector3::x(), Vector3::y()].map(|axis| (middle * axis).dot(&way));
             *start = pose;
-            let most = way.norm() * roller.slip_max.sin() + BESIDE;
+            let most = way.norm() * libm::sin(roller.slip_max) + BESIDE;
             let is_rolled = sideways.abs() <= most && (tool.symmetric || ahead >= -BESIDE);
             if !is_rolled && found.last().is_none_or(|last| last.knot != k) {
                 found.push(Violation {

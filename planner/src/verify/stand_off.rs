@@ -89,7 +89,7 @@ fn look(
         grid.within(&target, squared.sqrt() + scan.spacing, |index, _, _| {
             facing = facing.max(-scan.normals[index as usize].dot(&axis));
         });
-        return Some(Look { distance, incidence: facing.clamp(-1.0, 1.0).acos() });
+        return Some(Look { distance, incidence: libm::acos(facing.clamp(-1.0, 1.0)) });
     }
     let mut first = f64::INFINITY;
     grid.within(&target, reach, |_, point, squared| {
@@ -143,7 +143,7 @@ mod tests {
             |time_ns: u64| PlanKnot { time_ns, line: Some([0.0; 3]), ..PlanKnot::free(arm.home()) };
         let plan = Plan::of(&robot, &arm, &tool, vec![knot(0), knot(1_000_000_000)]);
         let pose = tool.on(&arm).pose(&arm.home());
-        let normal = pose * Vector3::new(tilt.sin(), 0.0, -tilt.cos());
+        let normal = pose * Vector3::new(libm::sin(tilt), 0.0, -libm::cos(tilt));
         let at = |i: i32| 0.005 * f64::from(i) - 0.05;
         let points: Vec<Point3<f64>> =
             (0..441).map(|k| pose * Point3::new(at(k % 21), at(k / 21), distance)).collect();

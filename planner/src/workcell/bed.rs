@@ -70,7 +70,7 @@ impl Bed {
         let grid = Grid::new(&points, radius);
         let (stand_off, graze, spare) =
             if tool.touches() { (tool.stand_off, GRAZE, 0.0) } else { (0.0, AFAR.0, AFAR.1) };
-        let facing = (tool.reach_angle - spare).max(0.0).cos();
+        let facing = libm::cos((tool.reach_angle - spare).max(0.0));
         Self { surface, points, grid, radius, deepest, highest, facing, stand_off, graze }
     }
 
@@ -223,7 +223,7 @@ impl Bed {
     fn over(&self, at: &SurfacePoint) -> f64 {
         let mut highest = 0.0_f64;
         if !self.points.is_empty() {
-            let reach = self.radius.hypot(UNEVEN);
+            let reach = libm::hypot(self.radius, UNEVEN);
             self.grid.within(&at.point, reach, |_, p, squared| {
                 let height = (p - at.point).dot(&at.normal);
                 let beside = squared - height * height;
@@ -243,8 +243,8 @@ fn tilts(normal: &UnitVector3<f64>) -> impl Iterator<Item = UnitVector3<f64>> {
     TILTS.into_iter().flat_map(move |tilt| {
         (0..TURNS).map(move |k| {
             let turn = TAU * k as f64 / TURNS as f64;
-            let aside = e1 * turn.cos() + e2 * turn.sin();
-            UnitVector3::new_normalize(normal * tilt.cos() + aside * tilt.sin())
+            let aside = e1 * libm::cos(turn) + e2 * libm::sin(turn);
+            UnitVector3::new_normalize(normal * libm::cos(tilt) + aside * libm::sin(tilt))
         })
     })
 }
@@ -320,7 +320,8 @@ mod tests {
         let at = Point3::new(0.04, 0.0, 0.0);
         let leans = |p: &Point3<f64>| (p - at).norm() < 0.002;
         let leaning = scene.surface.points.iter().position(leans).expect("a floor has points");
-        let aslant = Vector3::new(0.0, 50f64.to_radians().sin(), 50f64.to_radians().cos());
+        let aslant =
+            Vector3::new(0.0, libm::sin(50f64.to_radians()), libm::cos(50f64.to_radians()));
         scene.surface.normals[leaning] = UnitVector3::new_normalize(aslant);
         let up = UnitVector3::new_normalize(Vector3::z());
         let patch = |centre| Patch { centre, normal: up, points: Vec::new(), rmse: 0.0 };
@@ -356,7 +357,8 @@ mod tests {
         let mut scene = ridge(0.0);
         let leans = |p: &Point3<f64>| (p - Point3::new(0.04, 0.0, 0.0)).norm() < 0.002;
         let leaning = scene.surface.points.iter().position(leans).expect("a floor has points");
-        let aslant = Vector3::new(0.0, 50f64.to_radians().sin(), 50f64.to_radians().cos());
+        let aslant =
+            Vector3::new(0.0, libm::sin(50f64.to_radians()), libm::cos(50f64.to_radians()));
         scene.surface.normals[leaning] = UnitVector3::new_normalize(aslant);
         let bed = Bed::new(&scene, &laid());
         // It is the nearest one within 2 mm to all sides; a way cuts a corner of that.

@@ -15,14 +15,14 @@ pub fn tangents(normal: &UnitVector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
 #[must_use]
 pub fn direction(normal: &UnitVector3<f64>, heading: f64) -> Vector3<f64> {
     let (e1, e2) = tangents(normal);
-    e1 * heading.cos() + e2 * heading.sin()
+    e1 * libm::cos(heading) + e2 * libm::sin(heading)
 }
 
 /// The heading of a direction, which is projected onto the tangent plane. \[rad\], (−π, π]
 #[must_use]
 pub fn heading_of(normal: &UnitVector3<f64>, direction: &Vector3<f64>) -> f64 {
     let (e1, e2) = tangents(normal);
-    direction.dot(&e2).atan2(direction.dot(&e1))
+    libm::atan2(direction.dot(&e2), direction.dot(&e1))
 }
 
 /// The contact frame's pose: origin `stand_off` above the surface point, z against the normal,
@@ -52,8 +52,11 @@ mod tests {
     fn heading_and_direction_are_inverse() {
         for k in 0..40 {
             let a = f64::from(k);
-            let normal =
-                UnitVector3::new_normalize(Vector3::new(a.sin(), (a * 1.7).cos(), 0.9 - 0.05 * a));
+            let normal = UnitVector3::new_normalize(Vector3::new(
+                libm::sin(a),
+                libm::cos(a * 1.7),
+                0.9 - 0.05 * a,
+            ));
             let heading = (a * 0.37).rem_euclid(6.0) - 3.0;
             let d = direction(&normal, heading);
             assert!((heading_of(&normal, &d) - heading).abs() < 1e-12);

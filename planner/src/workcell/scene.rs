@@ -154,7 +154,7 @@ impl Scene {
     #[must_use]
     pub fn near(&self, place: [f64; 2], distance: f64) -> (Self, Vec<u32>) {
         let [x, y] = place;
-        let is_near = |p: &Point3<f64>| (p.x - x).hypot(p.y - y) <= distance;
+        let is_near = |p: &Point3<f64>| libm::hypot(p.x - x, p.y - y) <= distance;
         let some = |points: &[Point3<f64>]| points.iter().copied().filter(is_near).collect();
         let kept: Vec<u32> = (0..self.surface.points.len() as u32)
             .filter(|&i| is_near(&self.surface.points[i as usize]))

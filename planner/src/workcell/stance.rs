@@ -182,8 +182,8 @@ pub fn candidates(
                     let turn = bearing + std::f64::consts::PI + yaw;
                     let pivot = Rotation2::new(turn) * Vector2::from(search.pivot);
                     let base = [
-                        centre.x + distance * bearing.cos() - pivot.x,
-                        centre.y + distance * bearing.sin() - pivot.y,
+                        centre.x + distance * libm::cos(bearing) - pivot.x,
+                        centre.y + distance * libm::sin(bearing) - pivot.y,
                         wrap(turn),
                     ];
                     stances.push((

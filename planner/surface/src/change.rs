@@ -75,7 +75,8 @@ impl Seen {
         let (mut heights, mut colour, mut coloured) = (Vec::new(), Vector3::zeros(), 0usize);
         // In the order of the file, so that sums do not depend on the grid.
         let mut near = Vec::new();
-        self.grid.within(centre, radius.hypot(NEAR), |index, _, _| near.push(index as usize));
+        self.grid
+            .within(centre, libm::hypot(radius, NEAR), |index, _, _| near.push(index as usize));
         near.sort_unstable();
         for index in near {
             let offset = self.points[index] - centre;

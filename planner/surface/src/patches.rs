@@ -94,7 +94,7 @@ pub fn fill_in(scan: &Scan, wanted: &[bool], config: &PatchConfig, angle: f64) -
         let mut near = Vec::new();
         grid.within(centre, reach, |local, _, _| {
             let index = indices[local as usize];
-            if scan.normals[index as usize].dot(normal) >= angle.cos() {
+            if scan.normals[index as usize].dot(normal) >= libm::cos(angle) {
                 near.push(index);
             }
         });
@@ -202,7 +202,7 @@ fn fit(
     rng: &mut ChaCha8Rng,
 ) -> Option<Patch> {
     let point = |index: u32| scan.points[index as usize];
-    let aligned = config.inlier_angle.cos();
+    let aligned = libm::cos(config.inlier_angle);
     let inliers = |through: Point3<f64>, normal: &Vector3<f64>| -> Vec<u32> {
         let belongs = |&index: &u32| {
             (point(index) - through).dot(normal).abs() <= config.inlier_distance

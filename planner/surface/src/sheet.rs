@@ -213,7 +213,7 @@ impl Surface {
                 let height = (point - plane.centroid).dot(&plane.normal);
                 // Noise puts the nearest raw point off the plane too; two spacings allow for it.
                 let beyond = (border.sqrt() - 2.0 * self.spacing.max(0.002)).max(0.0);
-                height.hypot(beyond)
+                libm::hypot(height, beyond)
             }
             None => squared.sqrt(),
         }
@@ -301,7 +301,7 @@ fn low_pass(line: &mut [SurfacePoint], shortest: f64) -> Option<()> {
     let (last, length) = (line.len() - 1, arc[arc.len() - 1]);
     let ends = [*line[0].normal, *line[last].normal];
     let straight = |i: usize| ends[0].lerp(&ends[1], arc[i] / length);
-    let wave = |m: usize, i: usize| (PI * m as f64 * arc[i] / length).sin();
+    let wave = |m: usize, i: usize| libm::sin(PI * m as f64 * arc[i] / length);
     let off: Vec<Vector3<f64>> = (0..=last).map(|i| *line[i].normal - straight(i)).collect();
     // More waves than half the points are not there to be told apart.
     let count = ((2.0 * length / shortest) as usize).min(last / 2);

@@ -140,8 +140,8 @@ impl Eye {
     /// The cell of a place's direction, and its distance. \[m\]
     fn look(&self, place: &Point3<f64>) -> (usize, f32) {
         let v = self.turn.inverse_transform_vector(&(place - self.at));
-        let column = (v.x.atan2(v.z) + PI) / self.angle;
-        let row = (v.y.atan2(v.x.hypot(v.z)) + FRAC_PI_2) / self.angle;
+        let column = (libm::atan2(v.x, v.z) + PI) / self.angle;
+        let row = (libm::atan2(v.y, libm::hypot(v.x, v.z)) + FRAC_PI_2) / self.angle;
         (row as usize * self.columns + column as usize, v.norm() as f32)
     }
 
@@ -257,7 +257,7 @@ mod tests {
             let eye = [Eye::of(&view, &surface, DEPTH).unwrap()];
             let edge = view.points.iter().map(|p| p.x).fold(f64::MIN, f64::max);
             let beside = |share: f64| {
-                let tangent = ((edge / 2.0).atan() + share * WINDOW).tan();
+                let tangent = libm::tan(libm::atan(edge / 2.0) + share * WINDOW);
                 Point3::new(2.2 * tangent, 0.01, 0.8)
             };
             assert!(is_unseen(&eye, &beside(0.33)), "edge at {edge}");
@@ -283,7 +283,7 @@ mod tests {
         // What keeps half a cell from the border comes so deep under the plate's middle.
         let deepest = |may: f64| {
             let border = border(&scan, &surface, may);
-            let under = border.iter().filter(|p| p.x.hypot(p.y) < 0.1);
+            let under = border.iter().filter(|p| libm::hypot(p.x, p.y) < 0.1);
             1.0 - under.map(|p| p.z).fold(0.0, f64::max) - 0.5 * CELL
         };
         let (forbidden, avoided) = (deepest(0.0), deepest(DEEPEST));

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Vector3};
 use wide::f64x4;
 
-use super::lanes::{Real, unit};
+use super::real::{Real, unit};
 use super::redundancy::Redundancy;
 use super::shape::Pr2Shape;
 use super::solution::{Branch, InverseKinematics, Solution, Solutions};
@@ -197,7 +197,7 @@ impl<T: Real> Wrist<T> {
     fn angles(&self) -> [T; 3] {
         let [x, y, z] = self.columns[0];
         let first = unit(y, -z);
-        [first.0.atan2(first.1), self.bend().atan2(x), self.last(first)]
+        [first.0.angle_over(first.1), self.bend().angle_over(x), self.last(first)]
     }
 
     /// The wrist roll that goes with a forearm roll (sine, cosine), from Rx(−q₅)·W. However loose
@@ -205,7 +205,7 @@ impl<T: Real> Wrist<T> {
     #[inline]
     fn last(&self, (sin, cos): (T, T)) -> T {
         let [_, y, z] = [0, 1, 2].map(|i| self.columns[i]);
-        (-(cos * z[1] + sin * z[2])).atan2(cos * y[1] + sin * y[2])
+        (-(cos * z[1] + sin * z[2])).angle_over(cos * y[1] + sin * y[2])
     }
 }
 
@@ -220,8 +220,8 @@ impl Wrist<f64> {
     fn straight(&self, last: f64) -> [f64; 3] {
         let [x, y, _] = [0, 1, 2].map(|i| self.columns[i]);
         // W₂₁ and W₁₁: sine and cosine of the sum of both rolls, or, folded, of their difference.
-        let sum = y[2].atan2(y[1]);
+        let sum = libm::atan2(y[2], y[1]);
         let first = if x[0] > 0.0 { sum - last } else { sum + last };
-        [first, self.bend().atan2(x[0]), self.last(first.sin_cos())]
+        [first, libm::atan2(self.bend(), x[0]), self.last(libm::sincos(first))]
     }
 }

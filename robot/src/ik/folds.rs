@@ -71,7 +71,7 @@ impl Folds {
     /// Bit k: fold joint k is on its negative side.
     pub(super) fn sides(&self, q: &JointVector) -> u8 {
         let side = |k: usize, &(joint, straight): &(usize, f64)| {
-            u8::from((q[joint] - straight).sin() < 0.0) << k
+            u8::from(libm::sin(q[joint] - straight) < 0.0) << k
         };
         self.joints.iter().enumerate().fold(0, |bits, (k, fold)| bits | side(k, fold))
     }

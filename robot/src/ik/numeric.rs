@@ -201,7 +201,7 @@ impl Numeric {
             }
             let normal = axis.cross(&wanted);
             let sine = normal.norm();
-            normal * (sine.atan2(axis.dot(&wanted)) / sine.max(f64::MIN_POSITIVE))
+            normal * (libm::atan2(sine, axis.dot(&wanted)) / sine.max(f64::MIN_POSITIVE))
         } else {
             return (pose_error(&tip, target), jacobian);
         };

@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::closed::{Family, Forearm};
-use super::lanes::{Real, unit};
+use super::real::{Real, unit};
 use super::shape::Pr2Shape;
 
 /// Branch bits: 0 = sign of the cosine of the upper-arm roll (set: negative), 1 = sign of the elbow
@@ -60,7 +60,7 @@ impl Family for ShoulderPan {
     #[inline]
     fn prepare(&self, w: &Vector3<f64>, pan: f64) -> Option<Prepared> {
         let Self { a, l1, l2 } = *self;
-        let (s1, c1) = pan.sin_cos();
+        let (s1, c1) = libm::sincos(pan);
         let r = Vector3::new(c1 * w.x + s1 * w.y - a, c1 * w.y - s1 * w.x, w.z);
         let c4 = (r.norm_squared() - l1 * l1 - l2 * l2) / (2.0 * l1 * l2);
         if c4.is_nan() || c4.abs() > 1.0 + ROUNDING {
@@ -80,7 +80,7 @@ impl Family for ShoulderPan {
     fn choose(&self, t: &Prepared, bits: u8, free: f64) -> Option<[f64; 3]> {
         let s4 = if bits & ELBOW_NEGATIVE != 0 { -t.elbow.0 } else { t.elbow.0 };
         if t.elbow.0 < STRAIGHT {
-            let (s3, c3) = free.sin_cos();
+            let (s3, c3) = libm::sincos(free);
             return Some([s4, s3, c3]);
         }
         let toward = if bits & ROLL_BACK != 0 { -t.height } else { t.height };
@@ -100,7 +100,12 @@ impl Family for ShoulderPan {
         let (x, z) = (l1 + l2 * c4, -(l2 * c3 * s4));
         let lift = unit(rx * z - rz * x, rx * x + rz * z);
         Forearm {
-            angles: [T::splat(t.pan), lift.0.atan2(lift.1), s3.atan2(c3), s4.atan2(c4)],
+            angles: [
+                T::splat(t.pan),
+                lift.0.angle_over(lift.1),
+                s3.angle_over(c3),
+                s4.angle_over(c4),
+            ],
             sines: [(T::splat(t.sines.0), T::splat(t.sines.1)), lift, (s3, c3), (s4, c4)],
         }
     }

@@ -13,7 +13,7 @@
 use nalgebra::Vector3;
 
 use super::closed::{Family, Forearm};
-use super::lanes::{Real, unit};
+use super::real::{Real, unit};
 use super::shape::Pr2Shape;
 
 /// Branch bits: 0 = root of the quadratic (set: the larger cosine of the elbow), 1 = sign of the
@@ -65,7 +65,7 @@ impl Family for UpperArmRoll {
     #[inline]
     fn prepare(&self, w: &Vector3<f64>, roll: f64) -> Option<Prepared> {
         let Self { a, l1, l2, k1, reach } = *self;
-        let (s3, c3) = roll.sin_cos();
+        let (s3, c3) = libm::sincos(roll);
         let k0 = (w.norm_squared() - reach) / (2.0 * a);
         let side = (l2 * s3) * (l2 * s3);
         let inverse = (k1 * k1 - side).recip();
@@ -110,14 +110,14 @@ impl Family for UpperArmRoll {
         let lift = unit(ahead * z - wz * x, ahead * x + wz * z);
         let out = a + ahead;
         let (pan, pan_angle) = if t.on_axis {
-            let (sin, cos) = free.sin_cos();
+            let (sin, cos) = libm::sincos(free);
             ((T::splat(sin), T::splat(cos)), T::splat(free))
         } else {
             let pan = unit(wy * out - wx * y, wx * out + wy * y);
-            (pan, pan.0.atan2(pan.1))
+            (pan, pan.0.angle_over(pan.1))
         };
         Forearm {
-            angles: [pan_angle, lift.0.atan2(lift.1), T::splat(t.roll), s4.atan2(c4)],
+            angles: [pan_angle, lift.0.angle_over(lift.1), T::splat(t.roll), s4.angle_over(c4)],
             sines: [pan, lift, roll, (s4, c4)],
         }
     }

@@ -156,5 +156,5 @@ fn distance(axis: &JointAxis, point: &Vector3<f64>) -> f64 {
 
 /// Angle from one vector to another about an axis perpendicular to both.
 fn angle(from: &Vector3<f64>, to: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
-    axis.dot(&from.cross(to)).atan2(from.dot(to))
+    libm::atan2(axis.dot(&from.cross(to)), from.dot(to))
 }

@@ -230,7 +230,7 @@ impl Question<'_> {
             let aligned = a4.cross(&bent).norm() < ALIGNED;
             let q4 = if aligned { self.free[3] } else { turn_between(&a4, &bent, &last) };
             let roll = (about(&a4, q4) * about(&a5, q5)).inverse() * rest;
-            let q6 = 2.0 * roll.coords.xyz().dot(&a6).atan2(roll.w);
+            let q6 = 2.0 * libm::atan2(roll.coords.xyz().dot(&a6), roll.w);
             found(arm_bits | side, [q1, q2, q3, q4, q5, q6]);
         }
     }
@@ -257,7 +257,7 @@ fn rotation_about(axis: &JointAxis, angle: f64) -> Isometry3<f64> {
 
 /// The angle of a rotation about an axis. \[rad\]
 fn angle_of(axis: &JointAxis, motion: &Isometry3<f64>) -> f64 {
-    2.0 * motion.rotation.coords.xyz().dot(&axis.direction).atan2(motion.rotation.w)
+    2.0 * libm::atan2(motion.rotation.coords.xyz().dot(&axis.direction), motion.rotation.w)
 }
 
 fn sine(one: &JointAxis, two: &JointAxis) -> f64 {

@@ -11,7 +11,7 @@ const FREE: f64 = 1e-9;
 /// The vector turned about a unit axis.
 #[inline]
 pub(super) fn turned(axis: &Vector3<f64>, angle: f64, v: &Vector3<f64>) -> Vector3<f64> {
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = libm::sincos(angle);
     v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos))
 }
 
@@ -19,7 +19,7 @@ pub(super) fn turned(axis: &Vector3<f64>, angle: f64, v: &Vector3<f64>) -> Vecto
 #[inline]
 pub(super) fn turn_between(axis: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
     let across = axis.cross(from);
-    across.dot(to).atan2(from.dot(to) - axis.dot(from) * axis.dot(to))
+    libm::atan2(across.dot(to), from.dot(to) - axis.dot(from) * axis.dot(to))
 }
 
 /// How a subproblem at its end is taken, as shares of the largest component.
@@ -63,7 +63,7 @@ impl Turns {
         let fixed = along.dot(axis) * axis.dot(v);
         let sine = along.dot(&axis.cross(v));
         let cosine = along.dot(v) - fixed;
-        let amplitude = sine.hypot(cosine);
+        let amplitude = libm::hypot(sine, cosine);
         let rest = wanted - fixed;
         if amplitude < FREE {
             return if rest.abs() < FREE { Self::Any } else { Self::None };
@@ -72,9 +72,9 @@ impl Turns {
         if share.is_nan() || share.abs() > 1.0 + slack.past {
             return Self::None;
         }
-        let middle = sine.atan2(cosine);
+        let middle = libm::atan2(sine, cosine);
         let most = 1.0 - slack.short;
-        let aside = share.clamp(-most, most).acos();
+        let aside = libm::acos(share.clamp(-most, most));
         if share.abs() < 1.0 || slack.short > 0.0 {
             Self::Two(middle + aside, middle - aside)
         } else {

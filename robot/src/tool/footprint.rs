@@ -101,7 +101,7 @@ impl Nozzle {
         if place.z <= 0.0 {
             return 0.0;
         }
-        let radius = place.z * self.cone.tan();
+        let radius = place.z * libm::tan(self.cone);
         let beside = 1.0 - (place.x * place.x + place.y * place.y) / (radius * radius);
         let through = 2.0 * self.rate / (PI * radius * radius) * beside.max(0.0);
         // Through a plane across the axis; the surface lies aslant to the ray.

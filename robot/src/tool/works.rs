@@ -90,9 +90,9 @@ impl Tool {
             Footprint::Rectangle | Footprint::Disc | Footprint::Roller(_) => {
                 [self.length, self.width]
             }
-            Footprint::Nozzle(Nozzle { cone, .. }) => [2.0 * self.stand_off * cone.tan(); 2],
+            Footprint::Nozzle(Nozzle { cone, .. }) => [2.0 * self.stand_off * libm::tan(cone); 2],
             Footprint::Camera(Camera { field_of_view, .. }) => {
-                field_of_view.map(|angle| 2.0 * self.stand_off * (0.5 * angle).tan())
+                field_of_view.map(|angle| 2.0 * self.stand_off * libm::tan(0.5 * angle))
             }
         }
     }
@@ -133,7 +133,7 @@ impl Tool {
     #[must_use]
     pub fn outer_radius(&self) -> f64 {
         let [across, along] = self.track();
-        if self.is_round() { 0.5 * along } else { 0.5 * along.hypot(across) }
+        if self.is_round() { 0.5 * along } else { 0.5 * libm::hypot(along, across) }
     }
 
     /// Whether a place is under it, seen along its axis on the plane `stand_off` ahead: along x and
@@ -144,7 +144,7 @@ impl Tool {
         let [across, along] = self.track();
         x.abs() <= 0.5 * along
             && y.abs() <= 0.5 * across
-            && (!self.is_round() || x.hypot(y) <= 0.5 * along)
+            && (!self.is_round() || libm::hypot(x, y) <= 0.5 * along)
     }
 
     /// Whether it works on a place: along x and y of the contact frame, and so far behind the plane
@@ -158,7 +158,7 @@ impl Tool {
             }
             Footprint::Nozzle(Nozzle { distance: [near, far], cone, .. }) => {
                 let ahead = self.stand_off + behind;
-                (near..=far).contains(&ahead) && x.hypot(y) <= ahead * cone.tan()
+                (near..=far).contains(&ahead) && libm::hypot(x, y) <= ahead * libm::tan(cone)
             }
             Footprint::Camera(Camera { distance: [near, far], .. }) => {
                 let ahead = self.stand_off + behind;
@@ -187,9 +187,9 @@ impl Tool {
     #[must_use]
     pub fn slopes(&self) -> [f64; 2] {
         match self.footprint {
-            Footprint::Nozzle(Nozzle { cone, .. }) => [cone.tan(); 2],
+            Footprint::Nozzle(Nozzle { cone, .. }) => [libm::tan(cone); 2],
             Footprint::Camera(Camera { field_of_view, .. }) => {
-                field_of_view.map(|angle| (0.5 * angle).tan())
+                field_of_view.map(|angle| libm::tan(0.5 * angle))
             }
             Footprint::Rectangle | Footprint::Disc | Footprint::Roller(_) => [0.0; 2],
         }

@@ -17,6 +17,7 @@ mod names;
 mod packages;
 mod programs;
 mod refusals;
+mod roundings;
 mod sizes;
 mod storeys;
 mod tokens;
@@ -69,6 +70,12 @@ fn no_upward_import() {
 fn libraries_stay_in_their_rooms() {
     let offences = libraries::check(&TREE, house::ROOMS);
     expect_none(offences, "Let the crate whose room it is do it, or see house.rs: ROOMS.");
+}
+
+#[test]
+fn plans_are_the_same_on_every_processor() {
+    let offences = roundings::check(&TREE, house::ROUNDED);
+    expect_none(offences, "Call the function of `libm`; four at once are in robot/src/lanes.rs.");
 }
 
 #[test]

@@ -132,7 +132,7 @@ fn extremes(points: &[Point3<f64>]) -> Vec<Vec3> {
     let mut found: Vec<usize> = (0..DIRECTIONS)
         .filter_map(|k| {
             let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
-            let (sine, cosine) = (golden * k as f64).sin_cos();
+            let (sine, cosine) = libm::sincos(golden * k as f64);
             let flat = (1.0 - z * z).sqrt();
             let n = Vector3::new(flat * cosine, flat * sine, z);
             let along = |i: &usize| n.dot(&points[*i].coords);

@@ -27,7 +27,7 @@ fn elbow() -> Soup {
 fn ring() -> Soup {
     let mut corners = Vec::new();
     for k in 0..12 {
-        let (sine, cosine) = (std::f64::consts::TAU * f64::from(k) / 12.0).sin_cos();
+        let (sine, cosine) = libm::sincos(std::f64::consts::TAU * f64::from(k) / 12.0);
         let block = cuboid([0.1, -0.03, -0.02], [0.14, 0.03, 0.02]);
         let turn =
             |p: Point3<f64>| Point3::new(cosine * p.x - sine * p.y, sine * p.x + cosine * p.y, p.z);
@@ -92,8 +92,8 @@ const STEPS: usize = 40;
 /// A place of a tube that is bent by 270° and stands aslant, by turn along it, turn about its middle
 /// and distance from that. \[rad\], \[m\]
 fn in_tube(along: f64, about: f64, out: f64) -> Point3<f64> {
-    let off = BEND[0] + out * about.cos();
-    let p = Point3::new(off * along.cos(), off * along.sin(), out * about.sin());
+    let off = BEND[0] + out * libm::cos(about);
+    let p = Point3::new(off * libm::cos(along), off * libm::sin(along), out * libm::sin(about));
     nalgebra::Rotation3::from_euler_angles(0.7, 0.4, 0.3) * p
 }
 

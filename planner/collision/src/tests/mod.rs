@@ -20,7 +20,7 @@ fn wall(count: usize, seed: u64) -> Vec<Point3<f64>> {
     (0..count)
         .map(|_| {
             let (y, z) = (rng.random_range(-0.7..0.3), rng.random_range(0.4..1.2));
-            let x = 0.7 + 0.05 * (5.0_f64 * y).sin() + rng.random_range(-0.002..0.002);
+            let x = 0.7 + 0.05 * libm::sin(5.0_f64 * y) + rng.random_range(-0.002..0.002);
             Point3::new(x, y, z)
         })
         .collect()

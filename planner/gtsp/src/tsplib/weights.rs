@@ -89,10 +89,10 @@ fn geographical(a: [f64; 3], b: [f64; 3]) -> f64 {
         TSPLIB_PI * (degrees + 5.0 * (x - degrees) / 3.0) / 180.0
     };
     let (lat, lon) = ([radians(a[0]), radians(b[0])], [radians(a[1]), radians(b[1])]);
-    let q1 = (lon[0] - lon[1]).cos();
-    let q2 = (lat[0] - lat[1]).cos();
-    let q3 = (lat[0] + lat[1]).cos();
-    (EARTH * (0.5 * ((1.0 + q1) * q2 - (1.0 - q1) * q3)).acos() + 1.0).trunc()
+    let q1 = libm::cos(lon[0] - lon[1]);
+    let q2 = libm::cos(lat[0] - lat[1]);
+    let q3 = libm::cos(lat[0] + lat[1]);
+    (EARTH * libm::acos(0.5 * ((1.0 + q1) * q2 - (1.0 - q1) * q3)) + 1.0).trunc()
 }
 
 /// `EDGE_WEIGHT_FORMAT`: which entries of the matrix a file lists, in which order.

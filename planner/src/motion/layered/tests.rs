@@ -15,7 +15,7 @@ struct Hidden {
 }
 
 fn surcharge(from: &Sample, to: &Sample) -> f64 {
-    let mix = (from.q[0] * 7919.0 + to.q[0] * 104_729.0).sin().abs();
+    let mix = libm::sin(from.q[0] * 7919.0 + to.q[0] * 104_729.0).abs();
     if mix > 0.9 { f64::INFINITY } else { mix * 3.0 }
 }
 
@@ -155,7 +155,7 @@ fn an_empty_layer_is_left_out() {
 struct Gates;
 
 fn opens(from: &JointVector, to: &JointVector) -> bool {
-    (from[0] * 7919.0 + to[0] * 104_729.0).sin() > 0.3
+    libm::sin(from[0] * 7919.0 + to[0] * 104_729.0) > 0.3
 }
 
 impl Moves for Gates {

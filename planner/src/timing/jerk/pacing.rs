@@ -119,7 +119,7 @@ impl Problem {
         for (accelerations, jerks) in self.accelerations.iter().zip(&self.jerks) {
             for j in 0..self.joints {
                 most = most.min(1.0 / accelerations[j].second.abs());
-                most = most.min(jerks[j].third.abs().powf(-2.0 / 3.0));
+                most = most.min(libm::pow(jerks[j].third.abs(), -2.0 / 3.0));
             }
         }
         0.8 * most
@@ -153,7 +153,7 @@ impl Problem {
                 }
                 product *= (1.0 - a * a) * (1.0 - s * s);
             }
-            sum += self.step / root - mu * product.ln();
+            sum += self.step / root - mu * libm::log(product);
         }
         sum
     }

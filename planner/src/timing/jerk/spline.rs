@@ -109,7 +109,7 @@ impl Spline {
                 let third = (accelerations[1] - accelerations[0]).abs() / h;
                 most = most.max(velocity / limits.velocity[j]);
                 most = most.max((acceleration / limits.acceleration[j]).sqrt());
-                most = most.max((third / jerk[j]).cbrt());
+                most = most.max(libm::cbrt(third / jerk[j]));
             }
             if most > 1.0 {
                 found.push(Excess { from: places[0], to: places[3], factor: most });

@@ -87,7 +87,7 @@ fn a_bend_keeps_all_limits_and_its_path() {
     let points: Vec<JointVector> = (0..=400)
         .map(|k| {
             let angle = 0.01 * f64::from(k);
-            lane(&[angle.cos(), angle.sin()])
+            lane(&[libm::cos(angle), libm::sin(angle)])
         })
         .collect();
     let limits = Limits { velocity: lane(&[2.0, 2.0]), acceleration: lane(&[4.0, 4.0]) };
@@ -99,13 +99,13 @@ fn a_bend_keeps_all_limits_and_its_path() {
     let took = knots[knots.len() - 1].time_ns as f64 * 1e-9;
     assert!(took > free_s && took < 1.2 * free_s, "{took} s, without a limit of jerk {free_s} s");
     for knot in &knots {
-        let radius = knot.q[0].hypot(knot.q[1]);
+        let radius = libm::hypot(knot.q[0], knot.q[1]);
         assert!((radius - 1.0).abs() < 4e-4, "{radius}");
     }
     // Slower where the tool is to be slower, here everywhere.
-    let slow = |_: f64, _: &JointVector, v: &JointVector| 0.3 / v[0].hypot(v[1]);
+    let slow = |_: f64, _: &JointVector, v: &JointVector| 0.3 / libm::hypot(v[0], v[1]);
     let knots = limited(&run, &limits, &jerk, &slow);
-    let speeds: Vec<f64> = knots.iter().map(|k| k.v[0].hypot(k.v[1])).collect();
+    let speeds: Vec<f64> = knots.iter().map(|k| libm::hypot(k.v[0], k.v[1])).collect();
     assert!(speeds.iter().all(|v| *v < 0.3 * 1.01));
     let held = speeds.iter().filter(|v| **v > 0.294).count();
     assert!(held as f64 > 0.9 * speeds.len() as f64, "{held} of {}", speeds.len());

@@ -60,7 +60,7 @@ pub fn level(raw: &RawScan, up: Option<UnitVector3<f64>>, seed: u64) -> Result<L
     let (thin, side) = flat::thin(&raw.points);
     let flats = flat::find(&thin, side, &noise, seed);
     let held = up.or(view).unwrap_or(Vector3::z_axis());
-    let limit = if up.is_some() { GIVEN } else { TILT }.cos();
+    let limit = libm::cos(if up.is_some() { GIVEN } else { TILT });
     let upwards = |flat: &Flat| {
         [flat.normal, -flat.normal].into_iter().find(|normal| normal.dot(&held) > limit)
     };
@@ -106,12 +106,12 @@ pub fn lean(raw: &RawScan, up: &UnitVector3<f64>, seed: u64) -> Option<Lean> {
     let large = || flats.iter().filter(|flat| flat.area >= AREA);
     let level = |flat: &Flat| flat.normal.dot(up).abs();
     let flat = large().max_by(|a, b| level(a).total_cmp(&level(b)))?;
-    if level(flat) > GIVEN.cos() {
+    if level(flat) > libm::cos(GIVEN) {
         return None;
     }
     let above = raw.sensor.map_or(up.into_inner(), |sensor| sensor - flat.centroid);
     let up_by_it = if flat.normal.dot(&above) < 0.0 { -flat.normal } else { flat.normal };
-    Some(Lean { angle: level(flat).min(1.0).acos(), area: flat.area, up: up_by_it })
+    Some(Lean { angle: libm::acos(level(flat).min(1.0)), area: flat.area, up: up_by_it })
 }
 
 /// The direction up of the camera at the file's origin that has seen a scan, were it held level; `None`

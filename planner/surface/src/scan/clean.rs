@@ -301,7 +301,7 @@ fn smooth(
     radius: f64,
 ) -> (Vec<Point3<f64>>, Vec<UnitVector3<f64>>) {
     let grid = Grid::new(points, radius);
-    let sharpness = 1.0 / (2.0 * (1.0 - EDGE_ANGLE.cos()));
+    let sharpness = 1.0 / (2.0 * (1.0 - libm::cos(EDGE_ANGLE)));
     (0..points.len())
         .into_par_iter()
         .map(|i| {
@@ -309,7 +309,7 @@ fn smooth(
             let mut mean = Vector3::zeros();
             let alike = |j: u32, squared: f64| {
                 let differs = 1.0 - normals[i].dot(&normals[j as usize]);
-                weight(squared / (radius * radius)) * (-2.0 * sharpness * differs).exp()
+                weight(squared / (radius * radius)) * libm::exp(-2.0 * sharpness * differs)
             };
             grid.within(&points[i], radius, |j, _, squared| {
                 mean += normals[j as usize].scale(alike(j, squared));

@@ -39,7 +39,7 @@ pub(super) fn fill(
     }
     let size = high - low;
     let [volume, shade] = volume_and_shade(&faces, first[0]);
-    let apart = APART.max((volume / MOST).cbrt()).max((shade / LINES).sqrt());
+    let apart = APART.max(libm::cbrt(volume / MOST)).max((shade / LINES).sqrt());
     // A line's number would leave its range.
     if !apart.is_finite() || size.amax() / apart > f64::from(u32::MAX) {
         return Vec::new();
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn where_much_is_enclosed_it_is_told_how_wide_apart_the_places_lie() {
         let hall = read(&brick(-2.0, 2.0, 0, false, false));
-        let apart = (64.0 / MOST).cbrt();
+        let apart = libm::cbrt(64.0 / MOST);
         assert!(apart > APART);
         let told: Vec<_> =
             hall.warnings.iter().filter(|w| matches!(w, ScanWarning::FilledWide { .. })).collect();

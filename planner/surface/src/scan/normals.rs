@@ -144,7 +144,7 @@ mod tests {
         let points: Vec<Point3<f64>> = (0..2000)
             .map(|i| {
                 let z = 1.0 - (f64::from(i) + 0.5) / 1000.0;
-                let (s, c) = (f64::from(i) * 2.399_963).sin_cos();
+                let (s, c) = libm::sincos(f64::from(i) * 2.399_963);
                 let r = (1.0 - z * z).sqrt();
                 Point3::new(0.2 * r * c, 0.2 * r * s, 0.2 * z)
             })

@@ -137,7 +137,7 @@ fn encloses(faces: &[[Point3<f64>; 3]]) -> Option<bool> {
     let volume: f64 =
         faces.iter().map(|f| (f[0] - origin).dot(&(f[1] - origin).cross(&(f[2] - origin)))).sum();
     let area: f64 = faces.iter().map(area).sum();
-    (volume.abs() > 1e-6 * area.powf(1.5)).then_some(volume > 0.0)
+    (volume.abs() > 1e-6 * libm::pow(area, 1.5)).then_some(volume > 0.0)
 }
 
 fn bounds(faces: &[[Point3<f64>; 3]]) -> (Vector3<f64>, Vector3<f64>) {

@@ -69,8 +69,8 @@ impl Kinect {
     ) -> SimulatedView {
         let sensor_pose = optical_pose(eye, target);
         let (fx, fy) = (
-            0.5 * self.width as f64 / (0.5 * self.horizontal_view).tan(),
-            0.5 * self.height as f64 / (0.5 * self.vertical_view).tan(),
+            0.5 * self.width as f64 / libm::tan(0.5 * self.horizontal_view),
+            0.5 * self.height as f64 / libm::tan(0.5 * self.vertical_view),
         );
         let rays: Vec<(Vector3<f64>, Option<f64>)> = (0..self.width * self.height)
             .into_par_iter()
@@ -145,6 +145,6 @@ fn optical_pose(eye: Point3<f64>, target: Point3<f64>) -> Isometry3<f64> {
 
 /// A standard normal number (Box & Muller 1958).
 fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+    let radius = (-2.0 * libm::log(1.0 - rng.random::<f64>())).sqrt();
+    radius * libm::cos(std::f64::consts::TAU * rng.random::<f64>())
 }

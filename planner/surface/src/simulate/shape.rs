@@ -42,11 +42,11 @@ impl Shape {
                 if gradient < 1e-12 { -axes.min() } else { k * (k - 1.0) / gradient }
             }
             Self::Cylinder(radius, half, rounding) => {
-                let radial = p.x.hypot(p.y) - (radius - rounding);
+                let radial = libm::hypot(p.x, p.y) - (radius - rounding);
                 let axial = p.z.abs() - (half - rounding);
-                radial.max(0.0).hypot(axial.max(0.0)) + radial.max(axial).min(0.0) - rounding
+                libm::hypot(radial.max(0.0), axial.max(0.0)) + radial.max(axial).min(0.0) - rounding
             }
-            Self::Torus(ring, tube) => (p.x.hypot(p.y) - ring).hypot(p.z) - tube,
+            Self::Torus(ring, tube) => libm::hypot(libm::hypot(p.x, p.y) - ring, p.z) - tube,
             Self::Capsule(a, b, radius) => {
                 let axis = b - a;
                 let along = ((p - a).dot(&axis) / axis.norm_squared()).clamp(0.0, 1.0);

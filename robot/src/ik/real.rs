@@ -4,6 +4,8 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use wide::f64x4;
 
+use crate::lanes;
+
 /// What the closed forms need of a number.
 pub(crate) trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
@@ -12,7 +14,7 @@ pub(crate) trait Real:
     fn sqrt(self) -> Self;
     fn recip(self) -> Self;
     /// Angle of the point (x, self), in [−π, π]; 0 for the origin.
-    fn atan2(self, x: Self) -> Self;
+    fn angle_over(self, x: Self) -> Self;
 }
 
 impl Real for f64 {
@@ -29,8 +31,8 @@ impl Real for f64 {
         self.recip()
     }
     #[inline]
-    fn atan2(self, x: Self) -> Self {
-        self.atan2(x)
+    fn angle_over(self, x: Self) -> Self {
+        libm::atan2(self, x)
     }
 }
 
@@ -48,8 +50,8 @@ impl Real for f64x4 {
         Self::ONE / self
     }
     #[inline]
-    fn atan2(self, x: Self) -> Self {
-        self.atan2(x)
+    fn angle_over(self, x: Self) -> Self {
+        lanes::atan2(self, x)
     }
 }
 
