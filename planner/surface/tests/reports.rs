@@ -65,6 +65,8 @@ fn the_names_of_the_columns_decide() {
 
     let error = read(table("lat,lon,alt\n", |_, p| xyz(p)), "a.csv").unwrap_err().to_string();
     assert!(error.starts_with("a.csv: line 1: no columns x, y, z"), "{error}");
+    let error = read("x,y,z\n", "a.csv").unwrap_err().to_string();
+    assert_eq!(error, "a.csv: line 1: no row of numbers follows \"x,y,z\"");
     let doubt = table("x y z\n", |i, p| format!("{} {}", 0.1 * i as f64, blank(p)));
     let error = read(doubt, "a.txt").unwrap_err().to_string();
     assert!(error.contains("is it x or an index?"), "{error}");

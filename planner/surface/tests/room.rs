@@ -186,3 +186,13 @@ fn the_chair_of_a_whole_scene_is_the_cropped_one() {
         .collect();
     assert!(shares.iter().any(|share| *share > 0.9), "{shares:?}");
 }
+
+#[test]
+fn numbers_beyond_all_rooms_make_no_object() {
+    // Their cells are the first and the last of all.
+    let corner = |i: usize| if i.is_multiple_of(2) { 1e300 } else { -1e300 };
+    let points: Vec<_> = (0..400).map(|i| Point3::new(corner(i), 1e300, -1e300)).collect();
+    let view = scan::View { points, ..scan::View::default() };
+    let room = Room::find(&PlacedScan { views: vec![view] }, 1);
+    assert!(room.planes.is_empty(), "{:?}", room.planes);
+}

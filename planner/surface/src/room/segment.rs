@@ -110,7 +110,8 @@ pub(super) fn find(scan: &PlacedScan, planes: &[Plane], noise: &Noise) -> Vec<Se
         while let Some(&[x, y, z]) = keys.get(next) {
             next += 1;
             for i in 0..27 {
-                let near = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
+                let at = |value: i64, step: i64| value.saturating_add(step - 1);
+                let near = [at(x, i % 3), at(y, i / 3 % 3), at(z, i / 9)];
                 if cells.contains_key(&near) && seen.insert(near) {
                     keys.push(near);
                 }

@@ -115,8 +115,11 @@ impl Array {
         if let Some(fields) = descr.strip_prefix('[') {
             return Self::of_fields(fields, count(&shape).ok_or_else(large)?);
         }
-        let kind = quoted(descr).and_then(Kind::of).filter(|kind| kind.is_number());
-        let kind = kind.ok_or_else(|| format!("{descr:.20} is no kind of number that is read"))?;
+        let name = quoted(descr).unwrap_or(descr);
+        let kind = Kind::of(name).filter(|kind| kind.is_number());
+        let kind = kind.ok_or_else(|| {
+            format!("{name:.20} is no kind of number that is read: save the array as float64")
+        })?;
         let [dimensions @ .., values] = &shape[..] else { return Err("a single number".into()) };
         if *values < 3 || dimensions.is_empty() {
             return Err(format!(
@@ -183,7 +186,8 @@ impl Array {
             let place = Place::Byte(begin + needed);
             parsed.warnings.push(ScanWarning::TrailingData { place });
         }
-        if self.others {
+        // The fields of records have names.
+        if self.others && !self.records {
             parsed.warnings.push(ScanWarning::Unnamed { first: 1, rest: Rest::Ignored });
         }
         Ok(parsed)
@@ -236,7 +240,20 @@ mod tests {
         data.extend(2.5f64.to_le_bytes());
         data.extend(1.25f32.to_le_bytes());
         data.extend(9u16.to_le_bytes());
-        assert_eq!(parse(&file(header, &data)).unwrap().points, [Point3::new(9.0, 1.25, 2.5)]);
+        let parsed = parse(&file(header, &data)).unwrap();
+        assert_eq!(parsed.points, [Point3::new(9.0, 1.25, 2.5)]);
+        assert_eq!(parsed.warnings, []);
+    }
+
+    #[test]
+    fn a_kind_of_number_that_is_not_read_is_named_alone() {
+        for kind in ["<f2", "|O", "<c16"] {
+            let header =
+                format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (2, 3), }}");
+            let cause = parse(&file(&header, &[0; 96])).unwrap_err().cause;
+            let wanted = format!("{kind} is no kind of number that is read");
+            assert!(cause.starts_with(&wanted), "{cause}");
+        }
     }
 
     #[test]

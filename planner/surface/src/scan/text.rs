@@ -69,7 +69,7 @@ impl<'a> Table<'a> {
         let first = loop {
             let Some((index, line)) = lines.next() else {
                 return match before.iter().rfind(|(_, line)| !is_comment(line)) {
-                    Some((index, line)) => no_names(*index, line),
+                    Some((index, line)) => no_rows(*index, line),
                     None => Ok(None),
                 };
             };
@@ -262,6 +262,11 @@ fn is_count(cells: &[&str]) -> bool {
 /// The one whole number of a line.
 fn count_of(line: &str) -> Option<usize> {
     line.trim().parse().ok()
+}
+
+fn no_rows<T>(index: usize, line: &str) -> Result<T, Malformed> {
+    let last: String = line.trim().chars().take(80).collect();
+    malformed(Place::Line(index + 1), format!("no row of numbers follows {last:?}"))
 }
 
 fn no_names<T>(index: usize, line: &str) -> Result<T, Malformed> {
