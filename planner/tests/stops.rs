@@ -17,6 +17,7 @@ fn setup() -> Setup {
     Setup {
         job: Job { ik_samples: 24, refinements: 0, ..Job::new(arms[0].clone()) },
         arms,
+        together: false,
         most: Some(2),
         held: vec![("torso_lift_joint".to_owned(), 0.2)],
         lift: None,
