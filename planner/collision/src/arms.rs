@@ -56,11 +56,8 @@ impl<'a> Arms<'a> {
     pub fn span(&self, arm: usize, middle: &JointVector, travel: &JointVector) -> Span {
         let world = self.worlds[arm];
         let poses = world.bodies.poses(middle);
-        let mut span = Span {
-            poses,
-            centres: [Vector3::zeros(); MAX_BODIES],
-            slack: [0.0; MAX_BODIES],
-        };
+        let mut span =
+            Span { poses, centres: [Vector3::zeros(); MAX_BODIES], slack: [0.0; MAX_BODIES] };
         for (body, (centre, _)) in world.reach.ball.iter().enumerate() {
             span.centres[body] = poses[body].apply(centre);
             span.slack[body] = world.reach.displacement(body, travel);

@@ -69,7 +69,9 @@ pub(super) fn least_time(room: &Room<'_>) -> Option<Vec<Move>> {
 /// The first of the least.
 fn least(costs: &[u32; 3]) -> (usize, u32) {
     let first = (0, costs[0]);
-    (1..3).map(|m| (m, costs[m])).fold(first, |best, next| if next.1 < best.1 { next } else { best })
+    (1..3)
+        .map(|m| (m, costs[m]))
+        .fold(first, |best, next| if next.1 < best.1 { next } else { best })
 }
 
 /// Which move before `last` is the cheapest, and what it costs with it.

@@ -147,6 +147,7 @@ impl<'a> Rounds<'a> {
                 made: made.clone(),
                 most: self.setup.most,
                 swept: &self.swept,
+                together: self.setup.together,
             });
             let nothing = vec![Vec::new(); limbs.len()];
             let new: Vec<&Stop> =
