@@ -12,7 +12,7 @@ use crate::workcell::Stance;
 const STOP: f64 = 0.008;
 /// What a point costs that makes one arm of two that work at once take longer than the other, as a share
 /// of one that is swept.
-const ALONE: f64 = 0.2;
+const ALONE: f64 = 0.5;
 /// What another plan at a stop must gain.
 const PLAN: f64 = 0.002;
 

@@ -13,8 +13,10 @@ use crate::plan::Plan;
 use crate::verify::{Given, between, verify};
 use crate::workcell::Stance;
 
-/// How often the split is made anew by how long the plans really take.
-const SPLITS: usize = 4;
+/// How often the split is made anew: by how long the plans really take, and then beside the best one, by
+/// this share of what both reach.
+const SPLITS: usize = 7;
+const BESIDE: f64 = 0.1;
 /// A pair that sweeps at least this share of what another one does may win by its time.
 const AS_MUCH: f64 = 0.99;
 
@@ -24,6 +26,8 @@ struct Pair {
     seconds: f64,
     /// Points that they sweep, and nothing before them.
     gained: usize,
+    /// See [`Split::place`].
+    place: usize,
 }
 
 /// Plans what is to be swept at a stop by two arms at once; one after the other where that cannot be.
@@ -33,22 +37,21 @@ struct Pair {
 pub(super) fn work_together(of: &Rounds<'_>, stop: &Stop) -> Result<Vec<Worked>, StopsError> {
     let split = Split::new(of, stop)?;
     let (mut best, mut paces, mut tried): (Option<Pair>, _, Vec<usize>) = (None, [1.0; 2], vec![]);
-    for _ in 0..SPLITS {
-        let place = split.place(paces);
-        if tried.contains(&place) {
-            break;
-        }
+    while tried.len() < SPLITS {
+        let beside = best.as_ref().map_or([0; 2], |best| split.beside(best.place));
+        let next = [split.place(paces), beside[0], beside[1]];
+        let Some(place) = next.into_iter().find(|place| !tried.contains(place)) else { break };
         tried.push(place);
         let shares = split.shares(place);
         if shares.iter().any(|share| share.patches.is_empty()) {
-            break;
+            continue;
         }
         let (first, second) = rayon::join(|| of.work(&shares[0]), || of.work(&shares[1]));
         let worked = [first?, second?];
-        let [Ok(one), Ok(other)] = [&worked[0].plan, &worked[1].plan] else { break };
+        let [Ok(one), Ok(other)] = [&worked[0].plan, &worked[1].plan] else { continue };
         let weights = split.weights(place);
         paces = [one.duration() / weights[0].max(1.0), other.duration() / weights[1].max(1.0)];
-        let Some(pair) = paired(of, &stop.stance, worked)? else { continue };
+        let Some(pair) = paired(of, &stop.stance, worked, place)? else { continue };
         if best.as_ref().is_none_or(|best| pair.beats(best)) {
             best = Some(pair);
         }
@@ -72,6 +75,7 @@ fn paired(
     of: &Rounds<'_>,
     stance: &Stance,
     worked: [Worked; 2],
+    place: usize,
 ) -> Result<Option<Pair>, StopsError> {
     let Rounds { robot, setup, scene, swept, .. } = of;
     let collision = &setup.job.collision;
@@ -109,7 +113,8 @@ fn paired(
     let first = again(0, &worked[0], &plans[0])?;
     let second = again(1, &worked[1], &plans[1])?;
     let gained = gains.iter().zip(swept).filter(|(gain, before)| **gain && !**before).count();
-    Ok(first.zip(second).map(|(one, other)| Pair { worked: [one, other], seconds, gained }))
+    let both = first.zip(second);
+    Ok(both.map(|(one, other)| Pair { worked: [one, other], seconds, gained, place }))
 }
 
 /// What is to be swept at a stop, by who reaches it.
@@ -183,6 +188,12 @@ impl Split {
         };
         let places = (0..=self.both.len()).map(|place| (apart(place), place));
         places.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, place)| place)
+    }
+
+    /// Two places next to one.
+    fn beside(&self, place: usize) -> [usize; 2] {
+        let by = (BESIDE * self.both.len() as f64).ceil() as usize;
+        [place.saturating_sub(by), (place + by).min(self.both.len())]
     }
 
     fn shares(&self, place: usize) -> [Share; 2] {
