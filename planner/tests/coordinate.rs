@@ -7,18 +7,19 @@ use nullsweep_planner::verify::{Given, ViolationKind, between, verify};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_robot::{ArmSpec, JointVector, Robot, Side, Tool};
 
-const SECOND: u64 = 1_000_000_000;
+/// From one turn to the next, no whole steps of any clock. \[ns\]
+const PERIOD: u64 = 2_013_456_789;
 
 fn specs() -> [ArmSpec; 2] {
     [ArmSpec::pr2(Side::Right), ArmSpec::pr2(Side::Left)]
 }
 
-/// The stretched arm goes by these turns of the shoulder, inwards \[rad\], two seconds from one to the next.
+/// The stretched arm goes by these turns of the shoulder, inwards \[rad\].
 fn swing(robot: &Robot, side: Side, profile: Profile, inwards: &[f64]) -> Plan {
     let arm = robot.arm(&ArmSpec::pr2(side)).expect("the PR2's arm");
     let inward = if side == Side::Right { 1.0 } else { -1.0 };
     let knot = |(k, turn): (usize, &f64)| PlanKnot {
-        time_ns: 2 * SECOND * k as u64,
+        time_ns: PERIOD * k as u64,
         q: JointVector::new([inward * turn, 0.0, 0.0, -0.3, 0.0, -0.3, 0.0, 0.0]),
         v: JointVector::ZERO,
         line: None,
@@ -59,7 +60,7 @@ fn arms_that_would_meet_wait_for_each_other_and_keep_their_paths() {
         assert!(hits(&robot, [&plans[0], &plans[1]]) > 0, "they would meet");
         let both = brought_together(&robot, &plans).expect("one after the other is free");
         assert_eq!(hits(&robot, [&both.plans[0], &both.plans[1]]), 0);
-        let [longest, one_after_the_other] = [4.0, 8.0];
+        let [longest, one_after_the_other] = [2.0, 4.0].map(|turns| turns * 1e-9 * PERIOD as f64);
         println!("{profile:?}: {:.2} s, waited {:?} s", both.seconds, both.waited);
         assert!(both.seconds > longest && both.seconds < 0.95 * one_after_the_other, "{both:?}");
         assert!(both.waited.iter().any(|waited| *waited > 0.0));
@@ -69,7 +70,7 @@ fn arms_that_would_meet_wait_for_each_other_and_keep_their_paths() {
             let mut before = 0;
             for knot in &plan.knots {
                 let at = found.find(|found| found.q == knot.q).expect("each knot is gone through");
-                assert!(at.time_ns - before >= if knot.time_ns == 0 { 0 } else { 2 * SECOND });
+                assert!(at.time_ns - before >= if knot.time_ns == 0 { 0 } else { PERIOD });
                 before = at.time_ns;
             }
             assert_eq!(now.knots.last().map(|k| k.q), plan.knots.last().map(|k| k.q));

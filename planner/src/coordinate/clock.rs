@@ -7,19 +7,18 @@ use crate::plan::{Plan, PlanKnot, Profile};
 
 /// What counts as rest: a velocity, and for a plan of limited jerk an acceleration. \[rad/s\], \[rad/s²\]
 const REST: f64 = 1e-6;
-/// A wait that is asked for so near to a knot is made in the knot. \[ns\]
+/// A wait of a bang-bang plan that is asked for so near to a knot is made in the knot. \[ns\]
 const SNAP_NS: u64 = 10_000;
-/// By how much a piece from rest to rest is made slower at least, so that rounding breaks no limit.
-const SLOWER: f64 = 2e-4;
 
-/// A plan whose rests are on whole steps, if it has limited accelerations, with the nodes between the
-/// steps in which it may wait.
+/// A plan with the nodes, a step from each other, in which it may wait.
 #[derive(Clone, Debug)]
 pub(super) struct Clocked {
     pub(super) plan: Plan,
     pub(super) step_ns: u64,
     /// For each node, one more than steps.
     pub(super) may_wait: Vec<bool>,
+    /// How far from its node a wait is made at most: where only rests will do, in the nearest one. \[ns\]
+    near_ns: u64,
 }
 
 /// A wait: at which time of the plan, and how long. \[ns\]
@@ -34,26 +33,22 @@ pub(super) struct Hull {
 
 impl Clocked {
     pub(super) fn new(plan: &Plan, step_ns: u64) -> Self {
-        let plan = if plan.profile.is_curved() { on_steps(plan, step_ns) } else { plan.clone() };
         let end_ns = plan.knots.last().map_or(0, |knot| knot.time_ns);
         let steps = end_ns.div_ceil(step_ns) as usize;
         let is_curved = plan.profile.is_curved();
         let mut may_wait: Vec<bool> = (0..=steps)
-            .map(|node| !is_curved && (plan.tool.touches() || is_off(&plan, node as u64 * step_ns)))
+            .map(|node| !is_curved && (plan.tool.touches() || is_off(plan, node as u64 * step_ns)))
             .collect();
-        if is_curved {
-            let rests = (0..plan.knots.len()).filter(|&k| is_rest(&plan, k));
-            for k in rests.filter(|&k| plan.tool.touches() || plan.knots[k].line.is_none()) {
-                let time_ns = plan.knots[k].time_ns;
-                if time_ns.is_multiple_of(step_ns) {
-                    may_wait[(time_ns / step_ns) as usize] = true;
-                }
-            }
+        let mut near_ns = SNAP_NS;
+        for rest_ns in rests(plan).filter(|_| is_curved) {
+            let node = nearest(rest_ns, step_ns);
+            may_wait[node] = true;
+            near_ns = near_ns.max(rest_ns.abs_diff((node as u64 * step_ns).min(end_ns)));
         }
         // Before it begins and after its end an arm is at rest.
         may_wait[0] = true;
         may_wait[steps] = true;
-        Self { plan, step_ns, may_wait }
+        Self { plan: plan.clone(), step_ns, may_wait, near_ns }
     }
 
     pub(super) fn steps(&self) -> usize {
@@ -65,7 +60,8 @@ impl Clocked {
     pub(super) fn hull(&self, from_ns: u64, to_ns: u64) -> Hull {
         let knots = &self.plan.knots;
         let end_ns = knots.last().map_or(0, |knot| knot.time_ns);
-        let (from, to) = (from_ns.saturating_sub(SNAP_NS), (to_ns + SNAP_NS).min(end_ns));
+        let near_ns = self.near_ns;
+        let (from, to) = (from_ns.saturating_sub(near_ns), (to_ns + near_ns).min(end_ns));
         let from = from.min(to);
         let first = knots.partition_point(|knot| knot.time_ns <= from).clamp(1, knots.len() - 1);
         let mut hull: Option<Hull> = None;
@@ -91,7 +87,7 @@ impl Clocked {
     /// The plan with waits, ascending in time.
     pub(super) fn with_waits(&self, waits: &[Wait]) -> Plan {
         let plan = &self.plan;
-        let mut waits = waits.iter().copied().peekable();
+        let mut waits = self.placed(waits).into_iter().peekable();
         let (mut knots, mut late): (Vec<PlanKnot>, u64) = (Vec::new(), 0);
         for (k, knot) in plan.knots.iter().enumerate() {
             let at = |knot: PlanKnot, late: u64| PlanKnot { time_ns: knot.time_ns + late, ..knot };
@@ -111,6 +107,22 @@ impl Clocked {
             hold(&mut knots, wait_ns);
         }
         Plan { knots, ..plan.clone() }
+    }
+
+    /// The waits where they can be made: in the last rest nearest to each node, where only rests will do.
+    fn placed(&self, waits: &[Wait]) -> Vec<Wait> {
+        let plan = &self.plan;
+        if !plan.profile.is_curved() {
+            return waits.to_vec();
+        }
+        let rest = |node: usize| {
+            rests(plan).filter(|&rest_ns| nearest(rest_ns, self.step_ns) == node).last()
+        };
+        let place = |&(time_ns, wait_ns): &Wait| {
+            let node = nearest(time_ns, self.step_ns);
+            (rest(node).unwrap_or(time_ns), wait_ns)
+        };
+        waits.iter().map(place).collect()
     }
 
     /// A knot inside the segment that ends in knot `k`.
@@ -153,11 +165,23 @@ impl Hull {
     }
 }
 
+/// The node nearest to a time.
+fn nearest(time_ns: u64, step_ns: u64) -> usize {
+    ((time_ns + step_ns / 2) / step_ns) as usize
+}
+
 /// Whether the tool is off the surface at a time, and a little before and after.
 fn is_off(plan: &Plan, time_ns: u64) -> bool {
     let last = plan.knots.len() - 1;
     let at = |ns: u64| plan.knots.partition_point(|knot| knot.time_ns < ns).min(last);
     (at(time_ns.saturating_sub(SNAP_NS))..=at(time_ns + SNAP_NS)).all(|k| !plan.on_surface(k))
+}
+
+/// The times in which an arm with limited acceleration may stay. \[ns\]
+fn rests(plan: &Plan) -> impl Iterator<Item = u64> {
+    let rests = (0..plan.knots.len()).filter(|&k| is_rest(plan, k));
+    let free = rests.filter(|&k| plan.tool.touches() || plan.knots[k].line.is_none());
+    free.map(|k| plan.knots[k].time_ns)
 }
 
 /// Whether the arm may stay in a knot for any time.
@@ -167,28 +191,4 @@ fn is_rest(plan: &Plan, k: usize) -> bool {
     let out = k + 1 < plan.knots.len() && !slow(&plan.curve(k + 1).acceleration(0.0));
     let is_even = plan.profile != Profile::Jerk || !(into || out);
     plan.knots[k].v == JointVector::ZERO && is_even
-}
-
-/// The plan with each piece from rest to rest so much slower that it begins and ends on whole steps.
-fn on_steps(plan: &Plan, step_ns: u64) -> Plan {
-    let mut knots = plan.knots.clone();
-    let last = knots.len() - 1;
-    let (mut from, mut begin_ns) = (0, 0);
-    for k in 1..=last {
-        if k < last && !is_rest(plan, k) {
-            continue;
-        }
-        let old_ns = plan.knots[k].time_ns - plan.knots[from].time_ns;
-        let least = old_ns as f64 * (1.0 + SLOWER);
-        let new_ns = (least / step_ns as f64).ceil() as u64 * step_ns;
-        let slower = new_ns as f64 / old_ns as f64;
-        for (knot, old) in knots[from + 1..=k].iter_mut().zip(&plan.knots[from + 1..=k]) {
-            let since = (old.time_ns - plan.knots[from].time_ns) as f64 * slower;
-            knot.time_ns = begin_ns + since.round() as u64;
-            knot.v = JointVector::from_fn(|j| old.v[j] / slower);
-        }
-        knots[k].time_ns = begin_ns + new_ns;
-        (from, begin_ns) = (k, begin_ns + new_ns);
-    }
-    Plan { knots, ..plan.clone() }
 }

@@ -15,20 +15,10 @@ use crate::workcell::Stance;
 
 /// How often the split is made anew: by how long the plans really take, and then beside the best one, by
 /// this share of what both reach.
-const SPLITS: usize = 7;
+const SPLITS: usize = 4;
 const BESIDE: f64 = 0.1;
 /// A pair that sweeps at least this share of what another one does may win by its time.
 const AS_MUCH: f64 = 0.99;
-
-/// Two plans that may be done at once.
-struct Pair {
-    worked: [Worked; 2],
-    seconds: f64,
-    /// Points that they sweep, and nothing before them.
-    gained: usize,
-    /// See [`Split::place`].
-    place: usize,
-}
 
 /// Plans what is to be swept at a stop by two arms at once; one after the other where that cannot be.
 ///
@@ -51,8 +41,7 @@ pub(super) fn work_together(of: &Rounds<'_>, stop: &Stop) -> Result<Vec<Worked>,
         let [Ok(one), Ok(other)] = [&worked[0].plan, &worked[1].plan] else { continue };
         let weights = split.weights(place);
         paces = [one.duration() / weights[0].max(1.0), other.duration() / weights[1].max(1.0)];
-        let Some(pair) = paired(of, &stop.stance, worked, place)? else { continue };
-        if best.as_ref().is_none_or(|best| pair.beats(best)) {
+        if let Some(pair) = paired(of, &worked, place, best.as_ref())? {
             best = Some(pair);
         }
     }
@@ -62,20 +51,23 @@ pub(super) fn work_together(of: &Rounds<'_>, stop: &Stop) -> Result<Vec<Worked>,
     }
 }
 
-impl Pair {
-    fn beats(&self, other: &Self) -> bool {
-        let (own, others) = (self.gained as f64, other.gained as f64);
-        AS_MUCH * own > others || (own >= AS_MUCH * others && self.seconds < other.seconds)
-    }
+/// Two plans that may be done at once.
+struct Pair {
+    worked: [Worked; 2],
+    seconds: f64,
+    /// Points that they sweep, and nothing before them.
+    gained: usize,
+    /// See [`Split::place`].
+    place: usize,
 }
 
-/// The plans of two shares on one clock, each verified anew and both against each other; `None` where
-/// they cannot be done at once.
+/// Both arms' plans of a split on one clock, each verified anew and both against each other; `None` where
+/// they cannot be done at once, or are no better than `best`.
 fn paired(
     of: &Rounds<'_>,
-    stance: &Stance,
-    worked: [Worked; 2],
+    worked: &[Worked; 2],
     place: usize,
+    best: Option<&Pair>,
 ) -> Result<Option<Pair>, StopsError> {
     let Rounds { robot, setup, scene, swept, .. } = of;
     let collision = &setup.job.collision;
@@ -85,36 +77,49 @@ fn paired(
     else {
         return Ok(None);
     };
-    let [x, y, _] = stance.base;
+    let gained = gained(swept, [&worked[0].swept, &worked[1].swept]);
+    if best.is_some_and(|best| !best.is_beaten(seconds, gained)) {
+        return Ok(None);
+    }
+    let [x, y, _] = worked[0].share.stance.base;
     let (here, kept) = scene.near([x, y], setup.around(robot, &setup.limbs(robot)?));
     let given = arms.map(|arm| Given { robot, arm, scene: &here, collision });
     if !between([&plans[0], &plans[1]], given)?.0.is_empty() {
         return Ok(None);
     }
-    let mut gains = vec![false; swept.len()];
-    let mut again = |arm: usize, before: &Worked, plan: &Plan| -> Result<_, StopsError> {
+    let again = |arm: usize, plan: &Plan| -> Result<Option<Worked>, StopsError> {
         let found = verify(plan, given[arm], &|| ())?;
         if !found.violations.is_empty() {
             return Ok(None);
         }
-        let swept: Vec<u32> =
-            kept.iter().zip(&found.swept).filter(|(_, s)| **s).map(|(point, _)| *point).collect();
-        swept.iter().for_each(|&point| gains[point as usize] = true);
-        let (task_time_s, knots) = (plan.duration(), plan.knots.len());
-        let figures = before.figures.clone();
+        let swept = kept.iter().zip(&found.swept).filter(|(_, s)| **s).map(|(point, _)| *point);
+        let (swept, task_time_s, knots) = (swept.collect(), plan.duration(), plan.knots.len());
+        let figures = worked[arm].figures.clone();
         Ok(Some(Worked {
             plan: Ok(plan.clone()),
             swept,
             figures: figures.map(|f| Figures { verification: found, task_time_s, knots, ..f }),
             at_once: arm == 1,
-            ..before.clone()
+            ..worked[arm].clone()
         }))
     };
-    let first = again(0, &worked[0], &plans[0])?;
-    let second = again(1, &worked[1], &plans[1])?;
-    let gained = gains.iter().zip(swept).filter(|(gain, before)| **gain && !**before).count();
-    let both = first.zip(second);
+    let both = again(0, &plans[0])?.zip(again(1, &plans[1])?);
     Ok(both.map(|(one, other)| Pair { worked: [one, other], seconds, gained, place }))
+}
+
+/// How many points are in either list, and were not swept before.
+fn gained(swept: &[bool], lists: [&[u32]; 2]) -> usize {
+    let mut new: Vec<u32> = lists.concat();
+    new.sort_unstable();
+    new.dedup();
+    new.into_iter().filter(|&point| !swept[point as usize]).count()
+}
+
+impl Pair {
+    fn is_beaten(&self, seconds: f64, gained: usize) -> bool {
+        let (own, others) = (self.gained as f64, gained as f64);
+        AS_MUCH * others > own || (others >= AS_MUCH * own && seconds < self.seconds)
+    }
 }
 
 /// What is to be swept at a stop, by who reaches it.
