@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 use super::choice::{Open, Stop, choose};
 use super::error::StopsError;
 use super::look::Ground;
-use super::pair::work_together;
 use super::setup::Setup;
 use super::share::{Share, Worked, work};
 use super::survey::{Site, Survey, survey};
@@ -110,14 +109,6 @@ impl<'a> Rounds<'a> {
     /// See [`work`].
     pub fn work(&self, share: &Share) -> Result<Worked, StopsError> {
         work(self.robot, self.setup, self.scene, &self.patches, share, &self.swept)
-    }
-
-    /// Plans what is to be done at a stop of the round, by both arms at once where that can be.
-    ///
-    /// # Errors
-    /// See [`work`].
-    pub fn work_together(&self, stop: &Stop) -> Result<Vec<Worked>, StopsError> {
-        work_together(self, stop)
     }
 
     /// The next stops with their shares; `None` where none is worth it.

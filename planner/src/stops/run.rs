@@ -5,6 +5,7 @@ use nullsweep_robot::Robot;
 use rayon::prelude::*;
 
 use super::error::StopsError;
+use super::pair::work_together;
 use super::program::program;
 use super::rounds::Rounds;
 use super::setup::Setup;
@@ -27,7 +28,7 @@ pub fn run(
     while let Some(stops) = rounds.next(progress)? {
         let worked = if setup.together {
             progress.stage("plans of the stops", Some(stops.len()));
-            all(&stops, progress, |stop| rounds.work_together(stop))?
+            all(&stops, progress, |stop| work_together(&rounds, stop))?
         } else {
             let shares: Vec<Share> = stops.into_iter().flat_map(|stop| stop.shares).collect();
             progress.stage("plans of the stops", Some(shares.len()));
