@@ -29,8 +29,9 @@ pub struct Together {
 }
 
 /// Puts waits into two arms' plans so that both may be gone along at once, in the least time that waits
-/// allow; the second one is gone along backwards where that takes less and its order is free. Both are of one stance, and hold the joints outside both arms in the same places. `None` where
-/// no way through the coordination diagram is proven free.
+/// allow; the second one is gone along backwards where that takes less and its order is free. Both are
+/// of one stance, and hold the joints outside both arms in the same places. `None` where no way through
+/// the coordination diagram is proven free.
 ///
 /// # Errors
 /// See [`CoordinateError`].
