@@ -35,6 +35,7 @@ pub mod plan;
 pub mod roadmap;
 pub mod sweep;
 
+pub mod coordinate;
 pub mod fairing;
 pub mod motion;
 pub mod timing;

@@ -7,7 +7,7 @@ use nullsweep_planner::pipeline::Job;
 use nullsweep_planner::plan::{Plan, PlanError, Program};
 use nullsweep_planner::progress::Silent;
 use nullsweep_planner::stops::{self, Rounds, Setup, Share, State};
-use nullsweep_planner::verify::{Given, verify};
+use nullsweep_planner::verify::{Given, between, verify};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_robot::{ArmSpec, Robot, Side};
 
@@ -17,6 +17,7 @@ fn setup() -> Setup {
     Setup {
         job: Job { ik_samples: 24, refinements: 0, ..Job::new(arms[0].clone()) },
         arms,
+        together: false,
         most: Some(2),
         held: vec![("torso_lift_joint".to_owned(), 0.2)],
         lift: None,
@@ -127,4 +128,44 @@ fn a_place_where_nothing_is_in_reach_is_told_with_what_was_looked_at() {
     high.surface.points.iter_mut().for_each(|p| p.z += 4.0);
     let error = stops::run(&robot, &setup, &high, &Silent).expect_err("4 m above the floor");
     assert!(error.to_string().contains("looked at"), "{error}");
+}
+
+#[test]
+fn two_arms_at_once_take_little_more_than_half_the_time() {
+    let (robot, seat) = (Robot::pr2(), common::seat());
+    let setup = Setup { together: true, most: Some(1), ..setup() };
+    let program = stops::run(&robot, &setup, &seat, &Silent).expect("a program");
+    let stop = &program.stops[0];
+    let [one, other] = *stop.together.first().expect("both arms work at once");
+    let works = [&stop.works[one], &stop.works[other]];
+    let (specs, collision) = (works.map(arm_of), &setup.job.collision);
+    let given =
+        [0, 1].map(|arm| Given { robot: &robot, arm: &specs[arm], scene: &seat, collision });
+    let (violations, _) =
+        between([&works[0].plan, &works[1].plan], given).expect("plans of one place");
+    assert!(violations.is_empty(), "{violations:?}");
+    for (work, given) in works.iter().zip(given) {
+        let found = verify(&work.plan, given, &|| ()).expect("a plan of this scene");
+        assert!(found.violations.is_empty(), "{:?}", found.violations);
+    }
+    let t = &program.totals;
+    let sum: f64 = stop.works.iter().map(|work| work.plan.duration()).sum();
+    println!("{:.2} s of {sum:.2} s, {:.3} swept", t.task_time_s, t.coverage_all);
+    assert!(t.task_time_s < 0.75 * sum, "{} s of {sum} s", t.task_time_s);
+    assert!(t.coverage_all > 0.8, "{}", t.coverage_all);
+
+    // What is done at once is sealed too, and must be two plans of two arms.
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("program.json");
+    let mut apart = program.clone();
+    apart.stops[0].together.clear();
+    assert!(program.check_seal().is_ok());
+    assert!(matches!(apart.check_seal(), Err(PlanError::Changed)));
+    for pairs in [vec![[0, 0]], vec![[0, 7]], vec![[0, 1], [1, 0]]] {
+        let mut wrong = program.clone();
+        wrong.stops[0].together = pairs;
+        wrong.write(&path).expect("written");
+        let refused = Program::read(&path).expect_err("no pairs");
+        assert!(matches!(refused, PlanError::NoPair { stop: 1 }), "{refused}");
+    }
 }

@@ -10,9 +10,9 @@ use pyo3::types::{PyBool, PyDict, PyString};
 use crate::errors::UsageError;
 
 /// Flags of a command alone: what it writes is returned here, and what it reads is given otherwise.
-const ELSEWHERE: [&str; 13] = [
+const ELSEWHERE: [&str; 14] = [
     "out", "json", "report", "cell", "continue", "help", "version", "quat", "offset", "stops", "arms",
-    "jobs", "job",
+    "together", "jobs", "job",
 ];
 
 /// Each keyword as a flag; `None` and `False` say nothing, `True` is a flag without a value, of a

@@ -24,6 +24,8 @@ struct StopSummary<'a> {
     held: &'a [(String, f64)],
     drive_m: f64,
     works: Vec<WorkSummary<'a>>,
+    together: &'a [[usize; 2]],
+    duration_s: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -61,6 +63,8 @@ fn stop_of(stop: &ProgramStop) -> StopSummary<'_> {
         held: &stop.held,
         drive_m: stop.drive_m,
         works: stop.works.iter().map(summary_of).collect(),
+        together: &stop.together,
+        duration_s: stop.seconds(),
     }
 }
 
@@ -83,7 +87,7 @@ pub(super) fn stop_rows(program: &Program) -> Vec<Vec<String>> {
                 tip(work).to_owned(),
                 percent(work.adds),
                 percent(work.kept_off_place),
-                format!("{:.1} s", work.plan.duration()),
+                takes(stop, w),
             ]);
         }
     }
@@ -118,6 +122,13 @@ pub(super) fn totals_rows(t: &Totals) -> Vec<Vec<String>> {
         row(&format!("  {}", left.why), format!("{} patches, {share}", left.patches));
     }
     rows
+}
+
+/// How long a plan takes, and which it may be done at once with.
+pub(super) fn takes(stop: &ProgramStop, work: usize) -> String {
+    let seconds = stop.works[work].plan.duration();
+    let beside = stop.beside(work).map(|other| format!(", with {}", tip(&stop.works[other])));
+    format!("{seconds:.1} s{}", beside.unwrap_or_default())
 }
 
 /// The arm's last link, by which people know it.

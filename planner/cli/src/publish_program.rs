@@ -11,7 +11,7 @@ use crate::exit::{OK, Usage};
 use crate::json::write_json;
 use crate::numbers::percent;
 use crate::output::{complain, say, writable};
-use crate::program::{place, tip};
+use crate::program::{place, takes, tip};
 use crate::program_args::{Asked, Limb, arm_of};
 use crate::program_report::Report;
 use crate::robot::differs;
@@ -126,7 +126,7 @@ fn tell_first(program: &Program, limbs: &[Limb], journal: &Journal) -> anyhow::R
                 once(place(stop)),
                 tip(work).to_owned(),
                 limb.map_or(String::new(), |limb| limb.name.clone()),
-                format!("{:.1} s", work.plan.duration()),
+                takes(stop, w),
                 percent(work.adds),
                 state.to_owned(),
             ]);
@@ -136,5 +136,11 @@ fn tell_first(program: &Program, limbs: &[Limb], journal: &Journal) -> anyhow::R
     say!(
         "the base drives from stop to stop, with all arms tucked; plans of a stop run one after the other"
     );
+    if program.stops.iter().any(|stop| !stop.together.is_empty()) {
+        say!(
+            "those that could run at once do not: each arm has an executor of its own, and one \
+             that stops stops no other"
+        );
+    }
     Ok(())
 }

@@ -29,6 +29,10 @@ pub(super) struct StopsArgs {
     /// may be repeated. Without it both arms of the PR2, else the arm.
     #[arg(long, value_name = "ARMS", requires = "stops")]
     arms: Vec<Arms>,
+    /// With --stops: the two arms work at once at a stop. What both reach is split so that both take as
+    /// long, and each waits where the other is in its way.
+    #[arg(long, requires = "stops", conflicts_with_all = ["jobs", "job"])]
+    together: bool,
     /// With --stops: plan nothing yet, but write a job for each plan of the first stops into this
     /// folder; `planner plan --job` does one, `planner join` puts the program together.
     #[arg(long, value_name = "FOLDER", requires = "stops")]
@@ -113,6 +117,10 @@ impl StopsArgs {
         bars: &Bars,
     ) -> anyhow::Result<Setup> {
         let arms = self.arms(plan)?;
+        if self.together && arms.len() != 2 {
+            let why = format!("--together is for two arms, here are {}: --arms", arms.len());
+            return Err(Usage(why).into());
+        }
         let job = plan.job(robot, site, None, bars)?;
         if arms.len() > 1 && job.start.is_some() {
             let why = "--start is one arm's: with several arms each begins where it is tucked";
@@ -126,7 +134,7 @@ impl StopsArgs {
             _ => None,
         };
         let tucked = job.start;
-        Ok(Setup { job, arms, most, held, lift, tucked, height: 0.0 })
+        Ok(Setup { job, arms, together: self.together, most, held, lift, tucked, height: 0.0 })
     }
 }
 

@@ -6,9 +6,9 @@ use anyhow::Context;
 use clap::Args;
 use nalgebra::{Isometry3, Point3};
 use nullsweep_collision::{Obstacle, Options};
-use nullsweep_planner::plan::{Plan, Program};
+use nullsweep_planner::plan::{Plan, Program, Work};
 use nullsweep_planner::progress::Progress;
-use nullsweep_planner::verify::{Given, Verification, verify};
+use nullsweep_planner::verify::{Given, Verification, between, verify};
 use nullsweep_planner::workcell::Scene;
 use nullsweep_report::ReportData;
 use nullsweep_robot::{ArmSpec, Robot};
@@ -20,6 +20,7 @@ use crate::json::write_json;
 use crate::numbers::percent;
 use crate::output::{complain, say, writable};
 use crate::picture::{Sitter, picture};
+use crate::program::tip;
 use crate::refusal::tell;
 use crate::robot::RobotArgs;
 use crate::scene::{Demo, SceneArgs, scene};
@@ -104,7 +105,7 @@ fn program_run(args: &VerifyArgs, program: Program, bars: &Bars) -> anyhow::Resu
     for (s, work) in program.works() {
         let [x, y, _] = work.plan.base;
         let (here, kept) = scene.near([x, y], program.near_m);
-        let arm: ArmSpec = work.arm.parse().map_err(Usage)?;
+        let arm = arm_of(work)?;
         bars.stage("verify", Some(work.plan.knots.len()));
         let given = Given { robot: &robot, arm: &arm, scene: &here, collision: &collision };
         let found = verify(&work.plan, given, &|| bars.tick());
@@ -121,6 +122,27 @@ fn program_run(args: &VerifyArgs, program: Program, bars: &Bars) -> anyhow::Resu
         broken += found.violations.len();
         all.push(found);
     }
+    for (s, stop) in program.stops.iter().enumerate() {
+        for pair in &stop.together {
+            let works = pair.map(|work| &stop.works[work]);
+            let arms: [ArmSpec; 2] = [arm_of(works[0])?, arm_of(works[1])?];
+            let given = [0, 1].map(|arm| Given {
+                robot: &robot,
+                arm: &arms[arm],
+                scene: &scene,
+                collision: &collision,
+            });
+            let found = between([&works[0].plan, &works[1].plan], given);
+            let (violations, collision_checks) =
+                found.with_context(|| format!("stop {}, both arms at once", s + 1))?;
+            let (stop, count) = ((s + 1).to_string(), violations.len().to_string());
+            let names = format!("{} and {} at once", tip(works[0]), tip(works[1]));
+            table.add_row([stop, names, count, String::new()]);
+            tell(&violations);
+            broken += violations.len();
+            all.push(Verification { violations, collision_checks, ..Verification::default() });
+        }
+    }
     let share = swept.iter().filter(|s| **s).count() as f64 / swept.len().max(1) as f64;
     match &args.json {
         Some(path) => write_json(&all, path)?,
@@ -134,6 +156,10 @@ fn program_run(args: &VerifyArgs, program: Program, bars: &Bars) -> anyhow::Resu
         program.sealed().write(out)?;
     }
     Ok(OK)
+}
+
+fn arm_of(work: &Work) -> anyhow::Result<ArmSpec> {
+    Ok(work.arm.parse().map_err(Usage)?)
 }
 
 /// What was found, and of what.

@@ -234,18 +234,28 @@ impl World {
         need: f64,
     ) -> bool {
         let (first, second) = (&self.moving[a], &self.moving[b]);
-        let (ra, rb) = (first.tree.root().radius, second.tree.root().radius);
-        let reach = ra + rb + need;
-        let between = poses[first.body].apply(&first.tree.root().centre)
-            - poses[second.body].apply(&second.tree.root().centre);
-        if between.norm_squared() >= reach * reach {
-            return true;
-        }
-        // The spheres of the smaller shape against the solid of the larger.
-        let (small, large) = if ra <= rb { (first, second) } else { (second, first) };
-        let relative = poses[large.body].inverse_then(&poses[small.body]);
-        is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
+        let (at, other) = (&poses[first.body], &poses[second.body]);
+        are_moving_clear((first, at), (second, other), need)
     }
+}
+
+/// Whether two shapes, each with its body's frame, are at least `need` from each other.
+pub(crate) fn are_moving_clear(
+    (first, at): (&Moving, &Frame),
+    (second, other): (&Moving, &Frame),
+    need: f64,
+) -> bool {
+    let (ra, rb) = (first.tree.root().radius, second.tree.root().radius);
+    let reach = ra + rb + need;
+    let between = at.apply(&first.tree.root().centre) - other.apply(&second.tree.root().centre);
+    if between.norm_squared() >= reach * reach {
+        return true;
+    }
+    // The spheres of the smaller shape against the solid of the larger.
+    let ((small, at), (large, other)) =
+        if ra <= rb { ((first, at), (second, other)) } else { ((second, other), (first, at)) };
+    let relative = other.inverse_then(at);
+    is_pair_clear(small, &relative, &large.solid, &large.place, &large.shape, need)
 }
 
 /// Whether a shape is at least `need` from all points of a field.

@@ -156,7 +156,7 @@ impl Exact {
     }
 
     /// The axis-aligned bounds of each part.
-    fn bounds(&self, poses: &[Pose]) -> Vec<Aabb> {
+    pub(crate) fn bounds(&self, poses: &[Pose]) -> Vec<Aabb> {
         let parts = self.scene.parts.iter().zip(poses);
         parts.map(|(part, pose)| part.shape.compute_aabb(pose)).collect()
     }
@@ -261,14 +261,14 @@ impl std::fmt::Debug for Exact {
 }
 
 /// Whether bounds alone show that two shapes keep a margin. \[m\]
-fn are_apart(a: &Aabb, b: &Aabb, margin: f64) -> bool {
+pub(crate) fn are_apart(a: &Aabb, b: &Aabb, margin: f64) -> bool {
     let need = margin + ROUNDING;
     let (over, under) = (a.mins - b.maxs, b.mins - a.maxs);
     over.max_element().max(under.max_element()) > need
 }
 
 /// NaN breaks every margin.
-fn breaks(distance: f64, margin: f64) -> bool {
+pub(crate) fn breaks(distance: f64, margin: f64) -> bool {
     distance < margin || distance.is_nan()
 }
 

@@ -15,6 +15,9 @@
 //!   limits, where no proof was made, counts as a collision there.
 //! - Each of them against the points around it and the obstacles, with [`Margins::environment`].
 //! - What does not move with the arm against the environment, once: [`World::stance_hit`].
+//! - Of two arms that move at the same time what moves with the one against what moves with the other,
+//!   with [`Margins::self_clearance`]: [`Arms`] by proofs over boxes of joint vectors, [`ExactArms`]
+//!   exactly.
 //!
 //! # What is around the robot
 //! [`Points`] are of three kinds: of the surface, raw measurements, and the border of what no view
@@ -39,11 +42,14 @@
 //!
 //! Obstacles are never contact.
 
+mod across;
+mod arms;
 mod bodies;
 mod check;
 mod clearance;
 mod error;
 mod exact;
+mod exact_arms;
 mod field;
 mod figure;
 mod fixed;
@@ -71,9 +77,11 @@ mod tests;
 mod tree;
 mod world;
 
+pub use arms::{Arms, Span};
 pub use clearance::Clearance;
 pub use error::CollisionError;
 pub use exact::Exact;
+pub use exact_arms::ExactArms;
 pub use figure::{Figure, FigureBody, FigureShape, Triangles};
 pub use mesh::{MeshError, MeshPaths};
 pub use obstacle::{Obstacle, ObstacleShape};

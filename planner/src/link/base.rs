@@ -220,6 +220,7 @@ mod tests {
             held: vec![("torso_lift_joint".into(), 0.2)],
             drive_m: 1.0,
             works: Vec::new(),
+            together: Vec::new(),
         }
     }
 

@@ -64,6 +64,14 @@ pub enum PlanError {
         /// Which plan of it, from 1.
         work: usize,
     },
+    /// What a stop's program says is done at once cannot be.
+    #[error(
+        "stop {stop}: what is done together must be pairs of its plans, of two arms, each plan in one pair"
+    )]
+    NoPair {
+        /// Which stop, from 1.
+        stop: usize,
+    },
     /// It never passed the last gate.
     #[error("the plan was not verified")]
     Unverified,

@@ -46,6 +46,11 @@ pub struct ProgramStop {
     pub drive_m: f64,
     /// What is done there, in this order.
     pub works: Vec<Work>,
+    /// Which of them may be done at once, two and two by their places in `works`: both plans begin at the
+    /// same time, and each waits where it has to for the other to be clear of it. One after the other they
+    /// may be done too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub together: Vec<[usize; 2]>,
 }
 
 /// A plan of an arm at a stop.
@@ -81,7 +86,7 @@ pub struct Totals {
     /// How far what the first choice of stops reaches can be from the best choice, as a share of all
     /// points: proven.
     pub choice_gap: f64,
-    /// Sum of the plans' durations. \[s\]
+    /// Sum of the plans' durations, of two that are done at once the longer one's. \[s\]
     pub task_time_s: f64,
     /// Sum of the drives between the stops. \[m\]
     pub drive_m: f64,
@@ -139,6 +144,9 @@ impl Program {
             if let Some(w) = stop.works.iter().position(|work| !stop.is_of(&work.plan)) {
                 return Err(PlanError::OtherStop { stop: s + 1, work: w + 1 });
             }
+            if !stop.are_pairs() {
+                return Err(PlanError::NoPair { stop: s + 1 });
+            }
         }
         Ok(program)
     }
@@ -182,8 +190,11 @@ impl Program {
     fn seal_now(&self) -> Seal {
         let stop = |stop: &ProgramStop| {
             let works: Vec<_> = stop.works.iter().map(|w| (&w.arm, w.adds, &w.plan.seal)).collect();
-            serde_json::to_value((stop.base, stop.base_height, &stop.held, stop.drive_m, works))
-                .ok()
+            let place = (stop.base, stop.base_height, &stop.held, stop.drive_m, works);
+            match stop.together.is_empty() {
+                true => serde_json::to_value(place).ok(),
+                false => serde_json::to_value((place, &stop.together)).ok(),
+            }
         };
         let stops: Vec<_> = self.stops.iter().map(stop).collect();
         Seal::new(&[], &(self.program, &self.robot, self.near_m, stops, &self.totals))
@@ -196,6 +207,33 @@ impl Program {
 }
 
 impl ProgramStop {
+    /// How long its plans take, two that are done at once as long as the longer one. \[s\]
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        let of = |work: usize| self.works[work].plan.duration();
+        let is_paired = |work: &usize| self.together.iter().flatten().any(|one| one == work);
+        let alone = (0..self.works.len()).filter(|work| !is_paired(work)).map(of);
+        let both = self.together.iter().map(|&[one, other]| of(one).max(of(other)));
+        alone.chain(both).sum()
+    }
+
+    /// The work that is done at the same time as another one, by their places in `works`.
+    #[must_use]
+    pub fn beside(&self, work: usize) -> Option<usize> {
+        let pair = self.together.iter().find(|pair| pair.contains(&work))?;
+        pair.iter().copied().find(|&other| other != work)
+    }
+
+    /// Whether what is done at once is two works of two arms, and each of one pair alone.
+    fn are_pairs(&self) -> bool {
+        let mut paired: Vec<usize> = self.together.iter().flatten().copied().collect();
+        paired.sort_unstable();
+        let is_once = paired.windows(2).all(|two| two[0] != two[1]);
+        let is_there = paired.last().is_none_or(|&last| last < self.works.len());
+        let arm = |work: usize| &self.works[work].arm;
+        is_once && is_there && self.together.iter().all(|&[one, other]| arm(one) != arm(other))
+    }
+
     /// Whether a plan was made for this place.
     fn is_of(&self, plan: &Plan) -> bool {
         let holds = |(name, at): &(String, f64)| {

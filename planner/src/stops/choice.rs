@@ -10,6 +10,9 @@ use crate::workcell::Stance;
 
 /// What a stop must gain to be worth the drive, as a share of all points.
 const STOP: f64 = 0.008;
+/// What a point costs that makes one arm of two that work at once take longer than the other, as a share
+/// of one that is swept.
+const ALONE: f64 = 0.5;
 /// What another plan at a stop must gain.
 const PLAN: f64 = 0.002;
 
@@ -24,6 +27,8 @@ pub(super) struct Open<'a> {
     pub(super) most: Option<usize>,
     /// For each point whether it was swept.
     pub(super) swept: &'a [bool],
+    /// Whether two arms work at once at a stop.
+    pub(super) together: bool,
 }
 
 /// A stop with what each arm is to sweep.
@@ -51,22 +56,34 @@ pub(super) fn choose(open: &Open<'_>) -> Choice {
     let mut weights: Vec<f64> = open.patches.iter().map(weight).collect();
     let is_made = |site: &&Site| open.made.contains(&site.stance);
     let (old, new): (Vec<&Site>, Vec<&Site>) = open.sites.iter().partition(|site| is_made(site));
-    let again = solve(&old, &weights, PLAN * points, old.len());
+    let again = solve(&old, &weights, vec![PLAN * points; old.len()], old.len());
     let mut stops = split(&old, &again, &weights, PLAN * points);
     for patch in stops.iter().flat_map(|stop| &stop.shares).flat_map(|share| &share.patches) {
         weights[*patch as usize] = 0.0;
     }
     let room = open.most.map_or(new.len(), |most| most.saturating_sub(open.made.len()));
-    let cover = solve(&new, &weights, STOP * points, room);
+    let uneven = |site: &&Site| if open.together { ALONE * uneven(site, &weights) } else { 0.0 };
+    let costs = new.iter().map(|site| STOP * points + uneven(site)).collect();
+    let cover = solve(&new, &weights, costs, room);
     stops.extend(split(&new, &cover, &weights, PLAN * points));
     Choice { stops, cover }
 }
 
-fn solve(sites: &[&Site], weights: &[f64], cost: f64, most: usize) -> Cover {
+/// How many points more than half of all the busier of two arms sweeps at a place, however what both reach
+/// is shared.
+fn uneven(site: &Site, weights: &[f64]) -> f64 {
+    let sum = |of: &[u32]| of.iter().map(|&patch| weights[patch as usize]).sum::<f64>();
+    let all = sum(&union(&site.reached));
+    // What the other one reaches it may leave to that one.
+    let alone = site.reached.iter().map(|reached| all - sum(reached)).fold(0.0, f64::max);
+    (alone - 0.5 * all).max(0.0)
+}
+
+fn solve(sites: &[&Site], weights: &[f64], costs: Vec<f64>, most: usize) -> Cover {
     cover(&Problem {
         weights: weights.to_vec(),
         sets: sites.iter().map(|site| union(&site.reached)).collect(),
-        costs: vec![cost; sites.len()],
+        costs,
         most,
     })
 }

@@ -3,7 +3,9 @@
 use nullsweep_collision::CollisionError;
 use nullsweep_robot::ArmError;
 
+use crate::coordinate::CoordinateError;
 use crate::pipeline::PipelineError;
+use crate::verify::VerifyError;
 
 /// Why there are no stops.
 #[derive(Debug, thiserror::Error)]
@@ -17,6 +19,18 @@ pub enum StopsError {
     /// A plan cannot be made, for a reason that no other stop mends.
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
+    /// Two plans cannot be brought onto one clock.
+    #[error(transparent)]
+    Coordinate(#[from] CoordinateError),
+    /// What was made cannot be checked.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    /// So many arms do not work at once.
+    #[error("{found} arms are to work at once at a stop: two can")]
+    NotTwo {
+        /// How many.
+        found: usize,
+    },
     /// What was begun is of another scene.
     #[error("what was begun was made for another scan, or for other patches of it")]
     OtherScene,

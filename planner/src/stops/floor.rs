@@ -15,7 +15,7 @@ use crate::workcell::{Scene, Stance, contact_pose, direction, redundancies};
 pub(super) struct Place {
     pub(super) stance: Stance,
     /// Patches for which some arm has joint vectors within its limits, ascending; collisions are not
-    /// looked at.
+    /// looked at. Where two arms are to work at once those that both have them for count twice.
     pub(super) promised: Vec<u32>,
 }
 
@@ -87,7 +87,7 @@ pub(super) fn places(
                     let promise =
                         |arm: &Raised| promised(arm, &here, &centres, &contacts, &from_floor);
                     let promised: Vec<Vec<u32>> = figure.arms.iter().map(promise).collect();
-                    let promised = union(&promised);
+                    let promised = if setup.together { sum(&promised) } else { union(&promised) };
                     if !promised.is_empty() {
                         places.push(Place { stance, promised });
                     }
@@ -97,6 +97,13 @@ pub(super) fn places(
         })
         .collect();
     Ok(found.into_iter().flatten().collect())
+}
+
+/// All that is in the lists, ascending.
+fn sum(lists: &[Vec<u32>]) -> Vec<u32> {
+    let mut all: Vec<u32> = lists.concat();
+    all.sort_unstable();
+    all
 }
 
 /// What is in some of the lists, ascending.

@@ -2,14 +2,16 @@
 //!
 //! A [`Survey`] says what each of many places on the floor reaches, by an exact look. A few of them are
 //! chosen by a weighted set cover ([`cover`](crate::cover)), what they reach is shared out among them and
-//! their arms ([`Share`]), each share is planned by itself ([`work`]), and what no plan has swept is chosen for
-//! again, until no stop is worth it ([`Rounds`]).
+//! their arms ([`Share`]), each share is planned by itself ([`work`]), or two arms' shares so that both work at
+//! once ([`coordinate`](crate::coordinate)), and what no plan has swept is chosen for again, until no stop is
+//! worth it ([`Rounds`]).
 
 mod choice;
 mod drive;
 mod error;
 mod floor;
 mod look;
+mod pair;
 mod program;
 mod rest;
 mod rounds;

@@ -35,10 +35,13 @@ pub fn program(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Program, Stop
     let mut stops = Vec::new();
     for (&stop, drive_m) in order.iter().zip(&drives) {
         let stance = &made[stop];
-        let mut works = Vec::new();
+        let (mut works, mut together) = (Vec::new(), Vec::new());
         for (one, plan) in plans(&of.state.worked, stance) {
             let new = one.swept.iter().filter(|&&point| !swept[point as usize]).count();
             one.swept.iter().for_each(|&point| swept[point as usize] = true);
+            if one.at_once {
+                together.push([works.len() - 1, works.len()]);
+            }
             works.push(Work {
                 arm: limbs[one.share.arm].spec.to_string(),
                 adds: new as f64 / points.max(1) as f64,
@@ -47,7 +50,8 @@ pub fn program(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Program, Stop
             });
         }
         let Stance { base, height, held } = stance.clone();
-        stops.push(ProgramStop { base, base_height: height, held, drive_m: *drive_m, works });
+        let drive_m = *drive_m;
+        stops.push(ProgramStop { base, base_height: height, held, drive_m, works, together });
     }
     let union = of.state.survey.union(of.patches.len());
     let mut any = vec![false; points];
@@ -55,7 +59,6 @@ pub fn program(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Program, Stop
         patch.points.iter().for_each(|&point| any[point as usize] = true);
     }
     let share = |of: &[bool]| of.iter().filter(|o| **o).count() as f64 / points.max(1) as f64;
-    let durations = stops.iter().flat_map(|stop: &ProgramStop| &stop.works);
     let totals = Totals {
         points,
         coverage_all: share(&swept),
@@ -63,7 +66,7 @@ pub fn program(of: &Rounds<'_>, progress: &dyn Progress) -> Result<Program, Stop
         places: of.state.survey.places,
         looked: of.state.survey.looked,
         choice_gap: of.state.gap,
-        task_time_s: durations.map(|work| work.plan.duration()).sum(),
+        task_time_s: stops.iter().map(ProgramStop::seconds).sum(),
         drive_m: drives.iter().sum(),
         off_m: off.along,
         off_rad: off.turned,

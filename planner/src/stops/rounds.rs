@@ -53,6 +53,10 @@ impl<'a> Rounds<'a> {
         scene: &'a Scene,
         progress: &dyn Progress,
     ) -> Result<Self, StopsError> {
+        let found = setup.arms.len();
+        if setup.together && found != 2 {
+            return Err(StopsError::NotTwo { found });
+        }
         progress.stage("patches", None);
         let patches = patches_of(scene, &setup.job)?;
         let survey = survey(robot, setup, scene, &patches, progress)?;
@@ -134,6 +138,7 @@ impl<'a> Rounds<'a> {
                 made: made.clone(),
                 most: self.setup.most,
                 swept: &self.swept,
+                together: self.setup.together,
             });
             let nothing = vec![Vec::new(); limbs.len()];
             let new: Vec<&Stop> =

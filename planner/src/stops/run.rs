@@ -5,10 +5,11 @@ use nullsweep_robot::Robot;
 use rayon::prelude::*;
 
 use super::error::StopsError;
+use super::pair::work_together;
 use super::program::program;
 use super::rounds::Rounds;
 use super::setup::Setup;
-use super::share::Share;
+use super::share::{Share, Worked};
 use crate::plan::Program;
 use crate::progress::Progress;
 use crate::workcell::Scene;
@@ -25,17 +26,32 @@ pub fn run(
 ) -> Result<Program, StopsError> {
     let mut rounds = Rounds::begin(robot, setup, scene, progress)?;
     while let Some(stops) = rounds.next(progress)? {
-        let shares: Vec<Share> = stops.into_iter().flat_map(|stop| stop.shares).collect();
-        progress.stage("plans of the stops", Some(shares.len()));
-        let worked: Vec<_> = shares
-            .par_iter()
-            .map(|share| {
-                let worked = rounds.work(share);
-                progress.tick();
-                worked
-            })
-            .collect();
-        rounds.add(worked.into_iter().collect::<Result<_, _>>()?);
+        let worked = if setup.together {
+            progress.stage("plans of the stops", Some(stops.len()));
+            all(&stops, progress, |stop| work_together(&rounds, stop))?
+        } else {
+            let shares: Vec<Share> = stops.into_iter().flat_map(|stop| stop.shares).collect();
+            progress.stage("plans of the stops", Some(shares.len()));
+            all(&shares, progress, |share| Ok(vec![rounds.work(share)?]))?
+        };
+        rounds.add(worked);
     }
     program(&rounds, progress)
+}
+
+/// What comes of each, in order.
+fn all<T: Sync>(
+    of: &[T],
+    progress: &dyn Progress,
+    work: impl Fn(&T) -> Result<Vec<Worked>, StopsError> + Sync,
+) -> Result<Vec<Worked>, StopsError> {
+    let done: Vec<Result<Vec<Worked>, StopsError>> = of
+        .par_iter()
+        .map(|one| {
+            let worked = work(one);
+            progress.tick();
+            worked
+        })
+        .collect();
+    Ok(done.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
 }

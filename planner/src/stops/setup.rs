@@ -13,6 +13,8 @@ pub struct Setup {
     pub job: Job,
     /// The arms that work, one after the other at a stop.
     pub arms: Vec<ArmSpec>,
+    /// Whether the two of them work at once instead, where they can.
+    pub together: bool,
     /// How many stops there are at most; `None`: as many as are worth it.
     pub most: Option<usize>,
     /// Held joints that are given. \[rad\] or \[m\]

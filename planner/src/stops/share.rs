@@ -37,6 +37,9 @@ pub struct Worked {
     pub figures: Option<Figures>,
     /// What its making had to tell.
     pub notes: Vec<String>,
+    /// Whether it may be done at once with the work before it in the list.
+    #[serde(default)]
+    pub at_once: bool,
 }
 
 /// What counts as the same place. \[rad\] or \[m\]
@@ -80,6 +83,7 @@ pub fn work(
         swept: Vec::new(),
         figures: None,
         notes,
+        at_once: false,
     };
     let notes = notes.told();
     let Outcome { plan, figures, arm, .. } = match made {
@@ -104,6 +108,7 @@ pub fn work(
         plan: Ok(plan),
         figures: Some(figures),
         notes,
+        at_once: false,
     })
 }
 

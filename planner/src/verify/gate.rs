@@ -163,6 +163,15 @@ pub enum VerifyError {
         /// How many it holds in the scene; `None`: no region of its name and kind is there.
         found: Option<usize>,
     },
+    /// Two plans that are to be gone along at once are not of one place of the robot.
+    #[error("of two plans that go on at once each has its own place of {what}")]
+    OtherPlace {
+        /// What stands elsewhere: the base, or a held joint.
+        what: String,
+    },
+    /// There is no motion.
+    #[error("a plan that is to be gone along with another one has no motion")]
+    NoMotion,
     /// The plan is of a scan as long, but elsewhere.
     #[error(
         "point {point} of the scan lies {distance_m:.4} m from where the plan has it: the scene is \
@@ -301,7 +310,7 @@ fn by_region(
 }
 
 /// The arm as the plan has it: its held joints where the plan holds them.
-fn arm_of(plan: &Plan, given: Given<'_>) -> Result<Arm, VerifyError> {
+pub(super) fn arm_of(plan: &Plan, given: Given<'_>) -> Result<Arm, VerifyError> {
     let held: Vec<(&str, f64)> = plan.held.iter().map(|h| (h.name.as_str(), h.position)).collect();
     let arm = given.robot.arm(given.arm)?.with_held(&held)?;
     if plan.joints != arm.joint_names() || plan.fingerprint != arm.fingerprint() {

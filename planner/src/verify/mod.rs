@@ -8,6 +8,7 @@
 //! leaves that line is a figure, not a rule), which points belong to reachable patches, and what was
 //! swept before.
 
+mod between;
 mod collisions;
 mod gate;
 mod keep_out;
@@ -17,6 +18,7 @@ mod slip;
 mod stand_off;
 mod violation;
 
+pub use between::between;
 pub use gate::{Against, Given, Verification, VerifyError, same_scan, verify};
 pub use press::{Press, press_depths};
 pub use stand_off::StandOff;

@@ -135,7 +135,7 @@ const WITH_POSES: &[&str] = &[
 #[rustfmt::skip]
 const WITH_PIPELINE: &[&str] = &[
     "progress", "cost", "cover", "workcell", "plan", "roadmap", "sweep",
-    "tour", "motion", "fairing", "timing", "verify", "link", "pipeline",
+    "tour", "motion", "fairing", "timing", "verify", "coordinate", "link", "pipeline",
 ];
 
 const PLANNER: &[(&str, &[&str])] = &[
@@ -158,6 +158,8 @@ const PLANNER: &[(&str, &[&str])] = &[
     ("fairing", &["progress", "cost", "band", "workcell", "plan", "roadmap", "sweep", "timing"]),
     ("timing", &["progress", "cost", "band", "workcell", "plan", "roadmap", "sweep"]),
     ("verify", &["progress", "cost", "regions", "workcell", "plan", "sweep"]),
+    // How two plans keep clear of each other: their paths and times alone.
+    ("coordinate", &["plan"]),
     ("link", BELOW_3),
     // given poses: what those who go through them share
     ("poses", BELOW_4),
@@ -175,7 +177,8 @@ const PLANNER: &[(&str, &[&str])] = &[
 const COLLISION: &[&str] = &[
     "frame", "rules", "points", "tree", "mesh", "srdf", "error", "options", "solid",
     "obstacle", "spheres", "sieve", "field", "bodies", "parts", "figure", "shapes", "sight", "pairs", "scene",
-    "exact", "clearance", "fixed", "moving", "motion", "never", "world", "check", "proof",
+    "across", "exact", "exact_arms", "clearance", "fixed", "moving", "motion", "never", "world", "check", "arms",
+    "proof",
 ];
 
 const SURFACE: &[&str] = &[
@@ -189,13 +192,25 @@ pub(crate) const APART: &[(&str, &str, &[&str])] = &[
     (
         "planner/src",
         "verify",
-        &["roadmap", "tour", "motion", "fairing", "pipeline", "poses", "task", "follow", "transit"],
+        &[
+            "roadmap",
+            "tour",
+            "motion",
+            "fairing",
+            "coordinate",
+            "pipeline",
+            "poses",
+            "task",
+            "follow",
+            "transit",
+        ],
     ),
     ("planner/src", "fairing", &["verify"]),
     ("planner/src", "roadmap", &["verify"]),
     ("planner/src", "tour", &["verify"]),
     ("planner/src", "motion", &["verify"]),
     ("planner/collision/src", "exact", &["frame", "spheres", "sieve", "field", "bodies"]),
+    ("planner/collision/src", "exact_arms", &["frame", "spheres", "sieve", "field", "bodies"]),
 ];
 
 /// Libraries of others, and the only folders that may name them.

@@ -77,6 +77,7 @@ fn program(stage: &Stage) -> PathBuf {
         held: vec![(TORSO.into(), torso)],
         drive_m: 0.5,
         works,
+        together: Vec::new(),
     };
     let [first, second] = [[1.0, 0.5, 0.0], [1.2, 0.5, 0.2]];
     let stops = vec![
