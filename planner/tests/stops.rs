@@ -151,7 +151,7 @@ fn two_arms_at_once_take_little_more_than_half_the_time() {
     let t = &program.totals;
     let sum: f64 = stop.works.iter().map(|work| work.plan.duration()).sum();
     println!("{:.2} s of {sum:.2} s, {:.3} swept", t.task_time_s, t.coverage_all);
-    assert!(t.task_time_s < 0.75 * sum, "{} s of {sum} s", t.task_time_s);
+    assert!(t.task_time_s < 0.65 * sum, "{} s of {sum} s", t.task_time_s);
     assert!(t.coverage_all > 0.8, "{}", t.coverage_all);
 
     // What is done at once is sealed too, and must be two plans of two arms.
