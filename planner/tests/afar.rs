@@ -2,12 +2,15 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use nullsweep_collision::{MeshPaths, Obstacle, Solids};
-use nullsweep_planner::plan::{PlanKnot, Profile, Trajectory};
+use nullsweep_planner::pipeline::idle;
+use nullsweep_planner::plan::{Plan, PlanKnot, Profile, Trajectory};
 use nullsweep_planner::sweep::{Clock, Missed, Sight, Unswept, coverage, deposits, missed};
+use nullsweep_planner::verify::stand_off;
+use nullsweep_planner::workcell::{Bed, Scene};
 use nullsweep_robot::{
     Arm, ArmSpec, Camera, Footprint, Geometry, JointVector, Nozzle, Robot, Side, Tool,
 };
-use nullsweep_surface::Scan;
+use nullsweep_surface::{Scan, SurfacePoint};
 
 const SPACING: f64 = 0.005;
 
@@ -168,4 +171,64 @@ fn a_disc_touches_its_circle_and_no_corner() {
         let far = p.x.hypot(p.y);
         assert!((far - 0.04).abs() < 1e-9 || touched == (far < 0.04), "{p}");
     }
+}
+
+/// Whether a nozzle is led along a straight way over a level square of 40 × 40 cm, from one place of its
+/// middle line to another: along x and above it. \[m\]
+fn is_led(distance: [f64; 2], [from, to]: [[f64; 2]; 2]) -> bool {
+    let scene = Scene::on_floor(squares(&[([0.0, 0.0, 0.0], 0.2)]));
+    let footprint = Footprint::Nozzle(Nozzle { distance, ..nozzle() });
+    let bed = Bed::new(&scene, &Tool { stand_off: 0.15, footprint, ..Tool::default() });
+    let normal = UnitVector3::new_normalize(Vector3::z());
+    let at = |[x, z]: [f64; 2]| SurfacePoint { point: Point3::new(x, 0.0, z), normal };
+    bed.line(&at(from), &at(to), 0.006, 0.07).is_some()
+}
+
+#[test]
+fn a_nozzle_is_led_where_the_surface_is_within_its_bounds() {
+    let wide = [0.10, 0.20];
+    assert!(is_led(wide, [[-0.1, 0.0], [0.1, 0.024]]));
+    assert!(!is_led(wide, [[-0.1, 0.0], [0.1, 0.027]]), "what is 3 cm off is not what it works on");
+    // Narrow bounds leave less, before the surface and behind it.
+    assert!(is_led([0.138, 0.162], [[-0.1, -0.004], [0.1, 0.004]]));
+    assert!(!is_led([0.138, 0.2], [[-0.1, 0.0], [0.1, -0.009]]));
+    assert!(!is_led([0.1, 0.162], [[-0.1, 0.0], [0.1, 0.009]]));
+}
+
+#[test]
+fn a_piece_that_is_too_far_costs_itself_alone() {
+    let robot = Robot::pr2();
+    let arm = arm();
+    let camera = Camera { distance: [0.25, 0.35], field_of_view: [0.8, 0.6] };
+    let footprint = Footprint::Camera(camera);
+    let tool = Tool { stand_off: 0.3, reach_angle: 0.5, footprint, ..Tool::default() };
+    let pad = tool.on(&arm);
+    // The arm turns about its first axis, the camera over one square after the other.
+    let knots: Vec<PlanKnot> = (0..9)
+        .map(|k: u64| {
+            let mut q = arm.home();
+            q[0] += 0.1 * k as f64;
+            let line = Some(pad.centre(&q).into());
+            PlanKnot { time_ns: 1_000_000_000 * k, q, v: JointVector::ZERO, line, patch: None }
+        })
+        .collect();
+    let mut scan =
+        Scan { raw: Vec::new(), points: Vec::new(), normals: Vec::new(), spacing: SPACING };
+    for (k, knot) in knots.iter().enumerate() {
+        let ahead = if [3, 4, 7].contains(&k) { 0.36 } else { 0.3 };
+        let before = pad.pose(&knot.q) * down(0.0);
+        let square = squares(&[([0.0, 0.0, -ahead], 0.01)]).transformed(&before);
+        scan.points.extend(square.points);
+        scan.normals.extend(square.normals);
+    }
+    scan.raw.clone_from(&scan.points);
+    let mut plan = Plan::of(&robot, &arm, &tool, knots.clone());
+    let broken = |plan: &Plan| stand_off(plan, &arm, &scan).1.len();
+    assert_eq!(broken(&plan), 5, "the segments to and from what is too far");
+    assert_eq!(idle(&mut plan, &arm, &scan), 2);
+    assert_eq!(broken(&plan), 0);
+    let works: Vec<usize> = (1..knots.len()).filter(|k| plan.on_surface(*k)).collect();
+    assert_eq!(works, [1, 2]);
+    let same = plan.knots.iter().zip(&knots).all(|(a, b)| a.q == b.q && a.time_ns == b.time_ns);
+    assert!(same, "the arm goes as it was planned");
 }

@@ -48,7 +48,7 @@ impl Scan {
         Ok(Self { words: words::of(keywords)?, files, _kept: kept })
     }
 
-    /// A simulated one: `chair`, `chair-seat` or `bobby-car`.
+    /// A simulated one: `chair`, `chair-seat`, `bobby-car` or `car-door`.
     #[staticmethod]
     #[pyo3(signature = (name, **keywords))]
     fn demo(name: &str, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {

@@ -20,8 +20,8 @@ use crate::scene::{Demo, SceneArgs, scene};
 
 #[derive(Debug, Args)]
 pub(super) struct BoundsArgs {
-    /// What is planned for, each by itself: chair, chair-seat, bobby-car (simulated), or a file as
-    /// `planner plan` takes it.
+    /// What is planned for, each by itself: chair, chair-seat, bobby-car, car-door (simulated),
+    /// or a file as `planner plan` takes it.
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<PathBuf>,
     #[command(flatten)]

@@ -165,6 +165,10 @@ fn rows(f: &Figures) -> Vec<[String; 2]> {
     rows
 }
 
+/// How what a tool that works from afar has worked on is counted from a plan: other things that may stand
+/// before it are not in the plan.
+pub(super) const OWN_SURFACE: &str = "by what its own surface hides alone";
+
 /// How fast a plan goes along its path, for people.
 pub(super) fn pace_rows(p: &Pace) -> Vec<[String; 2]> {
     let (p5, p50, p95) = (p.tool_speed_p5, p.tool_speed_p50, p.tool_speed_p95);

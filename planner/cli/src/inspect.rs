@@ -13,7 +13,7 @@ use nullsweep_robot::{Arm, MAX_DOF};
 use serde::Serialize;
 
 use crate::exit::OK;
-use crate::figures::{missed_rows, pace_rows};
+use crate::figures::{OWN_SURFACE, missed_rows, pace_rows};
 use crate::json::write_json;
 use crate::numbers::positive;
 use crate::output::{say, say_on};
@@ -65,6 +65,9 @@ struct Summary {
     passes: Option<Passes>,
     /// Reachable points that it does not sweep, by why; nothing where the plan is of another arm.
     missed: Option<Vec<MissedPoints>>,
+    /// Whether what other things hide from its tool counts as worked on: a plan holds its own surface alone.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    hidden_by_own_surface_alone: bool,
     continues_at_knot: Option<u32>,
     joints: Vec<JointSummary>,
     held: Vec<(String, f64)>,
@@ -171,6 +174,7 @@ fn summarise(plan: &Plan) -> Summary {
         pace: None,
         passes: None,
         missed: None,
+        hidden_by_own_surface_alone: !plan.is_of_poses() && !plan.tool.touches(),
         continues_at_knot: plan.continues.as_ref().map(|c| c.knot),
         joints: joints.collect(),
         held: plan.held.iter().map(|h| (h.name.clone(), h.position)).collect(),
@@ -205,6 +209,9 @@ fn tables(s: &Summary) -> String {
     }
     for [name, value] in s.missed.as_deref().map(missed_rows).unwrap_or_default() {
         plan.add_row([name, value]);
+    }
+    if s.hidden_by_own_surface_alone && s.missed.is_some() {
+        plan.add_row(["counted", OWN_SURFACE]);
     }
     if let Some(knot) = s.continues_at_knot {
         plan.add_row(["continues another plan at knot", &knot.to_string()]);

@@ -99,6 +99,8 @@ pub(super) enum Demo {
     ChairSeat,
     /// A ride-on toy car.
     BobbyCar,
+    /// A car's door without its window, upright.
+    CarDoor,
 }
 
 /// What becomes of the space that no view has seen.
@@ -193,6 +195,7 @@ fn simulated(demo: Demo, seed: u64) -> (Placed, Option<CropBox>) {
         Demo::Chair => (simulate::chair(seed), None),
         Demo::ChairSeat => (simulate::chair(seed), Some(simulate::chair_seat())),
         Demo::BobbyCar => (simulate::bobby_car(seed), None),
+        Demo::CarDoor => (simulate::car_door(seed), None),
     };
     let (scan, pose) = scan::place(&view.scan, &Placement::SensorPose(view.sensor_pose));
     let source = Source { file: PathBuf::new(), scale: 1.0, pose };

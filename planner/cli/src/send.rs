@@ -18,6 +18,7 @@ use nullsweep_planner::plan::{Held, Plan, Stretch};
 use nullsweep_planner::sweep::coverage;
 use nullsweep_robot::{Arm, wrap};
 
+use crate::figures::OWN_SURFACE;
 use crate::numbers::seconds;
 use crate::output::tell;
 
@@ -194,9 +195,8 @@ pub(super) fn outlook(plan: &Plan, arm: Option<&Arm>, now: Option<&Posture>) -> 
     } else if let Some([reachable, all]) = arm.and_then(|arm| swept(plan, arm)) {
         let share = |share: f64| format!("{:.1} %", 100.0 * share);
         let (reachable, all) = (share(reachable), share(all));
-        // Other things that may stand before it are not in a plan.
-        let seen = if plan.tool.touches() { "" } else { ", by what its own surface hides alone" };
-        line("sweeps", &format!("{reachable} of what is reachable, {all} of all points{seen}"));
+        let by = if plan.tool.touches() { String::new() } else { format!(", {OWN_SURFACE}") };
+        line("sweeps", &format!("{reachable} of what is reachable, {all} of all points{by}"));
     }
     let on_surface = plan.knots.last().is_some_and(|knot| knot.line.is_some());
     line("ends", if on_surface { "on the surface" } else { "off the surface" });

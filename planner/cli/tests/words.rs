@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use nullsweep_planner::plan::{Continues, Plan, PlanKnot};
-use nullsweep_robot::{ArmSpec, JointVector, Robot, Side, Tool};
+use nullsweep_robot::{ArmSpec, Camera, Footprint, JointVector, Robot, Side, Tool};
 
 fn planner(folder: &Path, args: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_planner"));
@@ -31,6 +31,27 @@ fn long_plan(path: &Path) {
     };
     let plan = Plan::of(&robot, &arm, &Tool::default(), (0..5000).map(knot).collect());
     plan.write(path).expect("written");
+}
+
+#[test]
+fn what_a_camera_has_seen_is_told_to_be_counted_without_what_hides_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.json");
+    let told = || {
+        let (code, said, complained) = run(folder.path(), "inspect plan.json");
+        assert_eq!(code, Some(0), "{complained}");
+        let (_, json, _) = run(folder.path(), "inspect plan.json --json -");
+        let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        (words.contains("by what its own surface"), json.contains("hidden_by_own_surface_alone"))
+    };
+    long_plan(&path);
+    assert_eq!(told(), (false, false));
+    let plan = Plan::read(&path).expect("a plan");
+    let camera = Camera { distance: [0.2, 0.4], field_of_view: [0.8, 0.6] };
+    let footprint = Footprint::Camera(camera);
+    let tool = Tool { stand_off: 0.3, footprint, ..Tool::default() };
+    Plan { tool, ..plan }.write(&path).expect("written");
+    assert_eq!(told(), (true, true));
 }
 
 #[test]

@@ -140,7 +140,11 @@ impl<C: Cost> Moves for Mover<'_, C> {
         let start = from.map_or(self.source, |s| s.q);
         let how = if from.is_some() { How::Jump } else { How::Start };
         self.memo.ways.get(Key::new(how, &start, to), || {
-            let joints = jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
+            let mut joints = jump(self.cell, &start, &to.q, self.seed_of(&start, &to.q))?;
+            // A tool that works from afar need not be lifted, and may go straight; it does not work there.
+            if let [first, last] = joints[..] {
+                joints.insert(1, first.lerp(&last, 0.5));
+            }
             let cost = self.lift + cost::of_path(self.cost, &joints);
             let pad = self.cell.tool.on(self.cell.arm);
             let mut line = vec![None; joints.len()];

@@ -1,7 +1,7 @@
 //! The whole way from a scene to a verified plan, on one page.
 
 use nullsweep_collision::World;
-use nullsweep_robot::{Arm, JointVector, Robot};
+use nullsweep_robot::{Arm, JointVector, Robot, Tool};
 use nullsweep_surface::{Patch, Scan, patches};
 use rayon::prelude::*;
 
@@ -11,6 +11,7 @@ use super::clock::Clock;
 use super::elsewhere::{Floor, advise};
 use super::error::PipelineError;
 use super::figures::{Figures, figures};
+use super::idle::idle;
 use super::job::{After, Job};
 use super::left_out::{Known, LeftOut, in_words, left_out, missed_by};
 use super::rounds::Course;
@@ -111,6 +112,7 @@ pub fn run(
     let (Made { attempt, mut plan }, rounds) =
         course.made(&planning, (patches, samples), rest.as_ref(), &mut clock)?;
     course.mark(&mut plan, planning.to_sweep);
+    tell_idle(idle(&mut plan, &arm, scan), &job.tool, progress);
     let Attempt { patches, graph, sequence, places, .. } = attempt;
 
     progress.stage("verify", Some(plan.knots.len()));
@@ -165,6 +167,17 @@ fn check(job: &Job) -> Result<(), PipelineError> {
         return Err(PipelineError::NoSpeed { tool: job.tool.name.clone() });
     }
     Ok(())
+}
+
+/// Says that a tool does not work over some pieces of its way.
+fn tell_idle(pieces: usize, tool: &Tool, progress: &dyn Progress) {
+    if pieces > 0 {
+        progress.note(&format!(
+            "{} does not work over {pieces} {} of its way: it would be too near, too far or too aslant",
+            tool.name,
+            if pieces == 1 { "piece" } else { "pieces" }
+        ));
+    }
 }
 
 /// Why no patch is reached from where the robot stands.

@@ -21,5 +21,5 @@ mod violation;
 pub use between::between;
 pub use gate::{Against, Given, Verification, VerifyError, same_scan, verify};
 pub use press::{Press, press_depths};
-pub use stand_off::StandOff;
+pub use stand_off::{StandOff, stand_off};
 pub use violation::{Violation, ViolationKind};

@@ -8,11 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::violation::{Violation, ViolationKind};
 use crate::plan::Plan;
+use crate::workcell::FACED;
 
 /// Joints move at most this far between two looks. \[rad\] or \[m\]
 const STEP: f64 = 0.01;
-/// Farthest from the place that the tool is led over that a point is the surface there. \[m\]
-const NEAR: f64 = 0.03;
 /// Farthest from the tool's axis that a point is met by it. \[m\]
 const BESIDE: f64 = 0.01;
 /// How much farther from the place that the tool is led over than its bounds let it be the surface is
@@ -41,7 +40,7 @@ struct Look {
 
 /// The figures, and the first place of each segment where a bound is broken; nothing of a tool that
 /// touches.
-pub(super) fn stand_off(plan: &Plan, arm: &Arm, scan: &Scan) -> (Option<StandOff>, Vec<Violation>) {
+pub fn stand_off(plan: &Plan, arm: &Arm, scan: &Scan) -> (Option<StandOff>, Vec<Violation>) {
     let tool = &plan.tool;
     if tool.touches() || scan.points.is_empty() {
         return (None, Vec::new());
@@ -83,7 +82,7 @@ fn look(
 ) -> Option<Look> {
     let target = pose * Point3::new(0.0, 0.0, tool.stand_off);
     let axis = pose.rotation * Vector3::z();
-    if let Some((nearest, squared)) = grid.nearest(&target, NEAR, |_| true) {
+    if let Some((nearest, squared)) = grid.nearest(&target, FACED, |_| true) {
         let distance = (scan.points[nearest as usize].coords - pose.translation.vector).dot(&axis);
         let mut facing = -1.0_f64;
         grid.within(&target, squared.sqrt() + scan.spacing, |index, _, _| {

@@ -28,6 +28,9 @@ const GRAZE: f64 = 0.0003;
 /// The same of a tool that works from afar, and how much more it is to face the surface than it must: so
 /// exactly its axis meets what is on the line between two of the arm's joint vectors. \[m\], \[rad\]
 const AFAR: (f64, f64) = (0.005, 0.1);
+/// Farthest from the place that a tool that works from afar is led over that the surface is the one that
+/// it works on. \[m\]
+pub const FACED: f64 = 0.03;
 /// Least step along a line where such a point is near. \[m\]
 const CREEP: f64 = 0.0001;
 /// The pad is raised and let down no more steeply than this along its way.
@@ -50,6 +53,8 @@ pub struct Bed {
     stand_off: f64,
     /// How much farther a point that lies too aslant stays than the nearest one. \[m\]
     graze: f64,
+    /// Farthest from the line that the nearest point is; infinite for a tool that touches. \[m\]
+    farthest: f64,
 }
 
 impl Bed {
@@ -71,7 +76,10 @@ impl Bed {
         let (stand_off, graze, spare) =
             if tool.touches() { (tool.stand_off, GRAZE, 0.0) } else { (0.0, AFAR.0, AFAR.1) };
         let facing = libm::cos((tool.reach_angle - spare).max(0.0));
-        Self { surface, points, grid, radius, deepest, highest, facing, stand_off, graze }
+        let [near, far] = tool.distance();
+        let room = FACED.min(tool.stand_off - near).min(far - tool.stand_off);
+        let farthest = if tool.touches() { f64::INFINITY } else { (room - graze).max(0.0) };
+        Self { surface, points, grid, radius, deepest, highest, facing, stand_off, graze, farthest }
     }
 
     /// A surface into which the pad may be pressed as deep as it likes, in any direction.
@@ -80,7 +88,8 @@ impl Bed {
         let (points, grid) = (Vec::new(), Grid::new(&[], 1.0));
         let deepest = f64::INFINITY;
         let (highest, facing, stand_off, graze) = (0.0, -1.0, 0.0, GRAZE);
-        Self { surface, points, grid, radius: 0.0, deepest, highest, facing, stand_off, graze }
+        let (radius, farthest) = (0.0, f64::INFINITY);
+        Self { surface, points, grid, radius, deepest, highest, facing, stand_off, graze, farthest }
     }
 
     /// The surface as it is.
@@ -186,6 +195,9 @@ impl Bed {
     /// its centre comes to be: at no place on the way is the nearest point one that lies too aslant.
     /// What is far from being the nearest does not become it for as long as its lead lasts.
     fn faces_between(&self, from: &SurfacePoint, to: &SurfacePoint) -> bool {
+        if !self.keeps_near(&from.point, &to.point) {
+            return false;
+        }
         let is_aslant =
             |n: &UnitVector3<f64>| from.normal.dot(n).min(to.normal.dot(n)) < self.facing;
         [0.0, self.stand_off].into_iter().all(|off| {
@@ -211,6 +223,27 @@ impl Bed {
                 gone = (gone + (0.5 * (aslant - near - self.graze)).max(CREEP)).min(length);
             }
         })
+    }
+
+    /// Whether the surface is nowhere farther from the way between two places than the tool's bounds
+    /// allow. No distance to it changes by more than one goes.
+    fn keeps_near(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
+        if self.farthest.is_infinite() {
+            return true;
+        }
+        let way = to - from;
+        let length = way.norm();
+        let mut gone = 0.0;
+        loop {
+            let at = from + way.scale(if length > 0.0 { gone / length } else { 0.0 });
+            let Some(near) = self.surface.distance_to(&at, self.farthest, |_| true) else {
+                return false;
+            };
+            if gone >= length {
+                return true;
+            }
+            gone = (gone + (self.farthest - near).max(CREEP)).min(length);
+        }
     }
 
     /// How far a pad with its centre here, already so far `off` the surface, has to be raised along

@@ -9,7 +9,7 @@ mod sample;
 mod scene;
 pub mod stance;
 
-pub use bed::Bed;
+pub use bed::{Bed, FACED};
 pub use contact::{contact_pose, direction, heading_of, tangents};
 pub use free::nearest_free;
 pub use obstruction::{Cause, Obstruction, obstruction};

@@ -107,7 +107,7 @@ class Scan:
     ) -> None: ...
     @staticmethod
     def demo(
-        name: Literal["chair", "chair-seat", "bobby-car"],
+        name: Literal["chair", "chair-seat", "bobby-car", "car-door"],
         *,
         unseen: Optional[Literal["avoid", "forbid", "free"]] = None,
     ) -> Scan: ...

@@ -1,4 +1,4 @@
-//! Simulated scans: the paper's two objects (§V) as a Kinect would have seen them.
+//! Simulated scans: the paper's two objects (§V), and a car's door, as a Kinect would have seen them.
 //!
 //! The authors' recordings are not published. These stand-ins have the size, the sensor and the
 //! point of view that their patch counts and tour lengths imply: a chair of about 0.5 m² and a
@@ -37,6 +37,13 @@ pub fn chair_twice(seed: u64) -> [SimulatedView; 2] {
 pub fn bobby_car(seed: u64) -> SimulatedView {
     let eye = Point3::new(-0.68, 0.18, SENSOR_HEIGHT);
     Kinect::default().view(&shape::bobby_car(), eye, Point3::new(0.0, 0.0, 0.16), seed)
+}
+
+/// A car's door that hangs upright 0.35 m above the floor, its outside towards the sensor.
+#[must_use]
+pub fn car_door(seed: u64) -> SimulatedView {
+    let eye = Point3::new(-0.95, -0.10, SENSOR_HEIGHT);
+    Kinect::default().view(&shape::car_door(), eye, Point3::new(0.0, 0.0, 0.55), seed)
 }
 
 /// The seat of [`chair`] without backrest and legs, in the floor frame.

@@ -155,3 +155,16 @@ pub(super) fn bobby_car() -> Shape {
     // To the visible area of the paper's car.
     Shape::Scaled(1.045, Box::new(Shape::Union(parts, 0.015)))
 }
+
+/// A car's door without its window, 0.62 m along y and 0.42 m high, its outside towards −x: a panel that
+/// bulges, with the window's edge along its top and a flat handle.
+pub(super) fn car_door() -> Shape {
+    Shape::Union(
+        vec![
+            Shape::Bent(Box::new(block(0.04, 0.62, 0.40, 0.012)), 1.5).at(0.0, 0.0, 0.55),
+            Shape::Bent(Box::new(block(0.05, 0.60, 0.03, 0.012)), 1.5).at(0.0, 0.0, 0.745),
+            Shape::Ellipsoid(Vector3::new(0.012, 0.07, 0.022)).at(-0.012, 0.17, 0.66),
+        ],
+        0.02,
+    )
+}
