@@ -72,7 +72,6 @@ pub fn run(
     if all.is_empty() {
         return Err(PipelineError::AllSpared);
     }
-
     progress.stage("stance", None);
     let setting = clock.time("stance", || settle(robot, &free_arm, scene, &all, job))?;
     let Setting { stance, arm, scene: here, patches, world, others } = setting;
