@@ -3,8 +3,6 @@
 use nalgebra::Vector6;
 use nullsweep_robot::JointVector;
 
-use super::spline;
-
 /// Farthest between two controls. \[m\]
 const SPACING: f64 = 0.012;
 
@@ -62,7 +60,14 @@ impl Bend {
         let count = self.controls.len();
         let place = (u / self.spacing).max(0.0);
         let span = (place as usize).min(count + 2);
-        let weights = spline::weights(place - span as f64);
+        let t = place - span as f64;
+        let (s, t2, t3) = (1.0 - t, t * t, t * t * t);
+        let weights = [
+            s * s * s / 6.0,
+            (3.0 * t3 - 6.0 * t2 + 4.0) / 6.0,
+            (-3.0 * t3 + 3.0 * t2 + 3.0 * t + 1.0) / 6.0,
+            t3 / 6.0,
+        ];
         (0..4).filter_map(move |k| {
             let control = (span + k).checked_sub(3)?;
             (control < count).then_some((control, weights[k]))
@@ -75,11 +80,9 @@ impl Bend {
         self.weights(u).fold(Offset::NONE, add)
     }
 
-    /// Takes a share of the pad's bend out, and all of the joints' where there is to be none.
-    pub(super) fn shrink(&mut self, control: usize, [pad, joints]: [f64; 2]) {
-        let Offset { q, twist } = self.controls[control];
-        let q = JointVector::from_fn(|j| joints * q[j]);
-        self.controls[control] = Offset { q, twist: twist * pad };
+    /// Takes a control's bend out.
+    pub(super) fn straighten(&mut self, control: usize) {
+        self.controls[control] = Offset::NONE;
     }
 }
 

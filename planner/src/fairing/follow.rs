@@ -1,15 +1,15 @@
 //! The joints along an averaged and bent piece.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 use nullsweep_collision::ToolContact;
 use nullsweep_robot::{JointVector, MAX_DOF, damped_step, pose_error};
 use rayon::prelude::*;
 
-use super::averaged::Smooth;
-use super::piece::{Mean, Piece};
+use super::bend::Bend;
+use super::piece::{Laid, Piece};
+use super::window::Windows;
 use crate::plan::LINE_TOLERANCE;
-use crate::sweep::distance_to_segment;
-use crate::workcell::Workcell;
+use crate::workcell::{Bed, Workcell};
 
 /// Farthest between two joint vectors along the way. \[m\]
 const SPACING: f64 = 0.003;
@@ -35,30 +35,28 @@ pub(super) struct Station {
     pub(super) u: f64,
 }
 
-/// What came of following a way.
-pub(super) struct Followed {
-    /// Along it; none where the arm does not come everywhere.
-    pub(super) stations: Vec<Station>,
-    /// Where it does not go, or is not free. \[m\]
-    pub(super) stuck: Vec<f64>,
-}
-
-/// Follows the smooth way by some nodes along a piece.
-pub(super) fn follow(piece: &Piece, nodes: &[Mean], cell: Workcell<'_>) -> Followed {
-    let way = Way { line: Smooth::new(piece.length(), nodes), cell };
+/// Follows the averaged and bent piece, or says where it cannot be.
+pub(super) fn follow(
+    piece: &Piece,
+    windows: &Windows,
+    bend: &Bend,
+    cell: Workcell<'_>,
+    bed: &Bed,
+) -> Result<Vec<Station>, Vec<f64>> {
+    let way = Way { piece, windows, bend, cell, laid: piece.laid(bed, windows, bend) };
     let found: Vec<Result<Station, f64>> =
         places(piece).into_par_iter().map(|(u, patch)| way.at(u, patch).ok_or(u)).collect();
-    let stuck: Vec<f64> = found.iter().filter_map(|f| f.as_ref().err().copied()).collect();
-    if !stuck.is_empty() {
-        return Followed { stations: Vec::new(), stuck };
+    let failed: Vec<f64> = found.iter().filter_map(|f| f.as_ref().err().copied()).collect();
+    if !failed.is_empty() {
+        return Err(failed);
     }
     let coarse: Vec<Station> = found.into_iter().flatten().collect();
     let spans: Vec<Option<Vec<Station>>> =
         coarse.par_windows(2).map(|w| way.between(&w[0], &w[1], MAX_HALVINGS)).collect();
-    let stuck: Vec<f64> =
+    let failed: Vec<f64> =
         coarse.iter().zip(&spans).filter(|(_, span)| span.is_none()).map(|(s, _)| s.u).collect();
-    if !stuck.is_empty() {
-        return Followed { stations: Vec::new(), stuck };
+    if !failed.is_empty() {
+        return Err(failed);
     }
     let mut stations = vec![coarse[0]];
     stations.extend(spans.into_iter().flatten().flatten());
@@ -66,47 +64,46 @@ pub(super) fn follow(piece: &Piece, nodes: &[Mean], cell: Workcell<'_>) -> Follo
         let free = cell.world.motion_free(&w[0].q, &w[1].q, ToolContact::Allowed);
         (!free).then_some(0.5 * (w[0].u + w[1].u))
     };
-    let stuck = stations.par_windows(2).filter_map(collides).collect();
-    Followed { stations, stuck }
+    let failed: Vec<f64> = stations.par_windows(2).filter_map(collides).collect();
+    if failed.is_empty() { Ok(stations) } else { Err(failed) }
 }
 
-/// Where along a piece there is to be a joint vector, evenly, and the patches that are visited there.
+/// Where along a piece there is to be a joint vector: its ends, its patches, and evenly between.
 fn places(piece: &Piece) -> Vec<(f64, Option<u32>)> {
-    let count = (piece.length() / SPACING).ceil().max(1.0) as usize;
-    let count = count.max(piece.patches.len());
-    let near = |u: f64| (u / piece.length() * count as f64).round() as usize;
-    let own = apart(piece.patches.iter().map(|(u, _)| near(*u)).collect(), count);
-    let at = |k: usize| (piece.length() * k as f64 / count as f64, None);
-    let mut places: Vec<(f64, Option<u32>)> = (0..=count).map(at).collect();
-    for (k, (_, patch)) in own.into_iter().zip(&piece.patches) {
-        places[k].1 = Some(*patch);
+    let mut marks: Vec<(f64, Option<u32>)> = vec![(0.0, None)];
+    for &(u, patch) in &piece.patches {
+        match marks.last_mut() {
+            Some(last) if u - last.0 < 1e-6 => last.1 = Some(patch),
+            _ => marks.push((u, Some(patch))),
+        }
     }
-    places
-}
-
-/// Places in their order moved as little aside that none is another's; up to the last one.
-fn apart(mut places: Vec<usize>, last: usize) -> Vec<usize> {
-    for k in 1..places.len() {
-        places[k] = places[k].max(places[k - 1] + 1);
+    if piece.length() - marks[marks.len() - 1].0 > 1e-6 {
+        marks.push((piece.length(), None));
     }
-    let mut most = last;
-    for place in places.iter_mut().rev() {
-        *place = most.min(*place);
-        most = place.saturating_sub(1);
+    let mut places = vec![marks[0]];
+    for pair in marks.windows(2) {
+        let (a, b) = (pair[0].0, pair[1].0);
+        let count = ((b - a) / SPACING).ceil().max(1.0) as usize;
+        places.extend((1..count).map(|k| (a + (b - a) * k as f64 / count as f64, None)));
+        places.push(pair[1]);
     }
     places
 }
 
 struct Way<'a> {
-    line: Smooth<'a>,
+    piece: &'a Piece,
+    windows: &'a Windows,
+    bend: &'a Bend,
     cell: Workcell<'a>,
+    laid: Laid,
 }
 
 impl Way<'_> {
     fn at(&self, u: f64, patch: Option<u32>) -> Option<Station> {
-        let mean = self.line.at(u);
-        let pose = mean.pose()?;
-        let q = onto(self.cell, &pose, mean.q())?;
+        let window = self.windows.at(u);
+        let mean = self.piece.mean(u, window).moved(&self.bend.at(u));
+        let pose = mean.pose(self.laid.at(u, window))?;
+        let q = onto(self.cell, &pose, mean.q)?;
         self.cell.arm.within_margins(&q).then_some(Station { q, pose, patch, u })
     }
 
@@ -115,13 +112,12 @@ impl Way<'_> {
         if (0..MAX_DOF).any(|j| (b.q[j] - a.q[j]).abs() > MAX_STEP) {
             return None;
         }
-        let [from, to] = [a, b].map(|s| Point3::from(s.pose.translation.vector));
+        let middle = self.at(0.5 * (a.u + b.u), None)?;
         let centre = self.cell.tool.on(self.cell.arm).centre(&a.q.lerp(&b.q, 0.5));
-        if distance_to_segment(&centre, &from, &to) <= LINE_TOLERANCE {
+        if (centre.coords - middle.pose.translation.vector).norm() <= LINE_TOLERANCE {
             return Some(vec![*b]);
         }
         let halvings = halvings.checked_sub(1)?;
-        let middle = self.at(0.5 * (a.u + b.u), None)?;
         let mut stations = self.between(a, &middle, halvings)?;
         stations.extend(self.between(&middle, b, halvings)?);
         Some(stations)
@@ -145,15 +141,4 @@ pub(super) fn onto(
         q = q + damped_step(&jacobian, &error, DAMPING)?;
     }
     None
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn patches_that_are_visited_in_one_place_have_each_its_own() {
-        assert_eq!(apart(vec![0, 0, 4, 4, 5, 9, 9, 9], 9), [0, 1, 4, 5, 6, 7, 8, 9]);
-        assert_eq!(apart(vec![2, 5], 9), [2, 5]);
-    }
 }

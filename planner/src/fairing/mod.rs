@@ -5,19 +5,16 @@
 //! each contact piece, from where the tool is set down to where it is lifted off, is averaged along
 //! its length: the pad's place and normal over a window of some centimetres, its heading and the
 //! joints over a wider one (`Piece`). The joints are then brought onto the averaged
-//! pose by the least motion, so that what they do in the null space is averaged too. The way by the
-//! averaged places is a smooth curve, without what is uneven from one to the next. Where that
+//! pose by the least motion, so that what they do in the null space is averaged too. Where that
 //! does not go, collides, or sweeps too little, the window is narrowed and the piece made again;
 //! without a window it is what it was.
 
-mod averaged;
 mod bend;
 mod fair;
 mod follow;
 mod guard;
 mod piece;
 mod relax;
-mod spline;
 mod window;
 
 use nalgebra::Point3;
@@ -37,10 +34,8 @@ const LOSS: f64 = 0.003;
 /// Share of the widest windows down to which they are narrowed first, for the sake of what is swept:
 /// a scan's unevenness is averaged by narrow ones too, and corners are hardly cut.
 const GENTLE: f64 = 0.25;
-/// Rounds of bending, and those of them in which the pad is made to come over points that it would miss,
-/// before it is bent less.
-const ROUNDS: usize = 60;
-const GUARDED: usize = 20;
+/// Rounds of having the pad come over points that it would miss, before it is bent less.
+const GUARDED: usize = 12;
 
 /// What is to be swept.
 #[derive(Clone, Copy)]
@@ -131,25 +126,20 @@ impl<'a> Aim<'a> {
     /// With averaged pieces that are bent so as to take less time; `None` where too little is swept even
     /// so.
     fn relaxed(&self, pieces: &mut [Fair], bed: &Bed, limits: &Limits) -> Option<Plan> {
-        for round in 0..ROUNDS {
-            let free: Vec<bool> =
-                pieces.par_iter_mut().map(|piece| piece.relax(self.cell, bed, limits)).collect();
-            let free = free.into_iter().all(|free| free);
+        for round in 0.. {
+            pieces.par_iter_mut().for_each(|piece| piece.relax(self.cell, bed, limits));
             let made = assembled(self.plan, pieces);
             let after = self.keep.swept(&made, self.cell);
             let wanted = self.wanted(&after);
             if wanted == 0 {
-                if free {
-                    return Some(made);
-                }
-                continue;
+                return Some(made);
             }
             let lost = self.keep.lost(&self.before, &after);
             if round < GUARDED && guard(pieces, &lost, wanted, self.cell.tool) {
                 continue;
             }
             let given = pieces.iter_mut().map(|fair| fair.give_room_back(&lost, self.reach()));
-            if given.filter(|given| *given).count() == 0 && free {
+            if given.filter(|given| *given).count() == 0 {
                 return None;
             }
         }

@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use nullsweep_robot::JointVector;
+use rayon::prelude::*;
 
-use super::bend::Offset;
-use super::window::Window;
+use super::bend::{Bend, Offset};
+use super::window::{Window, Windows};
 use crate::plan::Plan;
 use crate::workcell::{Bed, Workcell};
 
@@ -15,6 +16,8 @@ const GRID: f64 = 0.001;
 const TURNING: f64 = 0.03;
 /// Terms of an average.
 const TAPS: usize = 64;
+/// Spacing of the places at which the averaged line is laid onto the surface. \[m\]
+const LAID: f64 = 0.004;
 
 /// A run of a plan's knots on the surface.
 pub(super) struct Piece {
@@ -62,72 +65,55 @@ impl State {
 
 /// A place of the averaged way.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Mean(State);
+pub(super) struct Mean {
+    /// Near the joint vector that is wanted, the redundancy as it should be.
+    pub(super) q: JointVector,
+    centre: Vector3<f64>,
+    travel: Vector3<f64>,
+    into: Vector3<f64>,
+    rise: f64,
+}
 
 /// Least length of an averaged unit vector: a pad that turns by more has no mean.
 const SHORTEST: f64 = 0.5;
 
 impl Mean {
-    /// A pad that looks along z.
-    #[cfg(test)]
-    pub(super) fn at(centre: Vector3<f64>) -> Self {
-        Self(State { centre, travel: Vector3::x(), into: Vector3::z(), ..State::NONE })
-    }
-
-    /// The sum of some with their weights, which are to add up to 1.
-    pub(super) fn sum<'a>(of: impl Iterator<Item = (&'a Self, f64)>) -> Self {
-        let mut sum = State::NONE;
-        of.for_each(|(mean, weight)| sum.add(&mean.0, weight));
-        Self(sum)
-    }
-
-    /// Near the joint vector that is wanted, the redundancy as it should be.
-    pub(super) fn q(&self) -> JointVector {
-        self.0.q
-    }
-
-    /// The contact pose; `None` where the pad turns too much to have a mean.
-    pub(super) fn pose(&self) -> Option<Isometry3<f64>> {
-        let State { centre, travel, into, .. } = self.0;
-        let z = into.try_normalize(SHORTEST)?;
-        let x = (travel - z * travel.dot(&z)).try_normalize(SHORTEST)?;
+    /// The contact pose, `laid` \[m\] along its own axis; `None` where the pad turns too much to have a mean.
+    pub(super) fn pose(&self, laid: f64) -> Option<Isometry3<f64>> {
+        let z = self.into.try_normalize(SHORTEST)?;
+        let x = (self.travel - z * self.travel.dot(&z)).try_normalize(SHORTEST)?;
         let axes = Matrix3::from_columns(&[x, z.cross(&x), z]);
         let rotation = Rotation3::from_matrix_unchecked(axes);
+        let centre = self.centre + z * laid;
         Some(Isometry3::from_parts(centre.into(), UnitQuaternion::from_rotation_matrix(&rotation)))
-    }
-
-    /// Shifted along the pad's axis. \[m\]
-    pub(super) fn shifted(mut self, by: f64) -> Self {
-        self.0.centre += self.axis() * by;
-        self
     }
 
     /// Bent aside.
     pub(super) fn moved(&self, by: &Offset) -> Self {
         let shift: Vector3<f64> = by.twist.fixed_rows::<3>(0).into();
         let turn = UnitQuaternion::from_scaled_axis(by.twist.fixed_rows::<3>(3));
-        Self(State {
-            q: self.0.q + by.q,
-            centre: self.0.centre + shift,
-            travel: turn * self.0.travel,
-            into: turn * self.0.into,
-            rise: self.0.rise,
-        })
+        Self {
+            q: self.q + by.q,
+            centre: self.centre + shift,
+            travel: turn * self.travel,
+            into: turn * self.into,
+            rise: self.rise,
+        }
     }
 
     /// The pad's axis; zero where it turns too much to have a mean.
     pub(super) fn axis(&self) -> Vector3<f64> {
-        self.0.into.try_normalize(SHORTEST).unwrap_or_default()
+        self.into.try_normalize(SHORTEST).unwrap_or_default()
     }
 
     /// How far along its axis the pad has to go to be off the surface by as much as it was; `None`
     /// over a hole.
     pub(super) fn laid(&self, bed: &Bed) -> Option<f64> {
-        let into = self.0.into.try_normalize(SHORTEST)?;
+        let into = self.into.try_normalize(SHORTEST)?;
         let normal = nalgebra::UnitVector3::new_normalize(-into);
-        let centre = Point3::from(self.0.centre);
+        let centre = Point3::from(self.centre);
         let foot = bed.surface().project(&centre, &normal)?;
-        Some((foot.point - centre).dot(&into) - self.0.rise)
+        Some((foot.point - centre).dot(&into) - self.rise)
     }
 }
 
@@ -151,14 +137,16 @@ impl Piece {
         let knots = &plan.knots[first..=last];
         let own = |q: &JointVector| {
             let pose = pad.pose(q);
-            let state = State {
+            let into = pose.rotation * Vector3::z();
+            let mean = Mean {
                 q: *q,
                 centre: pose.translation.vector,
                 travel: pose.rotation * Vector3::x(),
-                into: pose.rotation * Vector3::z(),
+                into,
                 rise: 0.0,
             };
-            State { rise: Mean(state).laid(bed).unwrap_or(0.0), ..state }
+            let Mean { centre, travel, .. } = mean;
+            State { q: *q, centre, travel, into, rise: mean.laid(bed).unwrap_or(0.0) }
         };
         let states: Vec<State> = knots.iter().map(|knot| own(&knot.q)).collect();
         let mut at = vec![0.0];
@@ -203,9 +191,26 @@ impl Piece {
     /// Averaged around a place of it. The window's ends lie within the piece, so its ends stay.
     pub(super) fn mean(&self, u: f64, window: Window) -> Mean {
         let near = self.averaged(u, window.place);
+        let State { centre, into, rise, .. } = near;
         let travel = self.averaged(u, window.heading).travel;
         let q = self.averaged(u, window.joints).q;
-        Mean(State { q, travel, ..near })
+        Mean { q, centre, travel, into, rise }
+    }
+
+    /// How many steps there are between the places at which it is laid onto the surface, [`LAID`] apart
+    /// at most.
+    pub(super) fn steps(&self) -> usize {
+        (self.length / LAID).ceil().max(1.0) as usize
+    }
+
+    /// How far the averaged and bent way has to be shifted along the pad's axis.
+    pub(super) fn laid(&self, bed: &Bed, windows: &Windows, bend: &Bend) -> Laid {
+        let count = self.steps();
+        let shift = |k: usize| {
+            let u = self.length * k as f64 / count as f64;
+            self.mean(u, windows.at(u)).moved(&bend.at(u)).laid(bed).unwrap_or(0.0)
+        };
+        Laid::new(self.length, (0..=count).into_par_iter().map(shift).collect())
     }
 
     fn averaged(&self, u: f64, width: f64) -> State {
@@ -225,5 +230,34 @@ impl Piece {
         let mut mean = State::NONE;
         mean.add(&sum, 1.0 / total);
         mean
+    }
+}
+
+/// Shifts onto the surface along a piece.
+pub(super) struct Laid {
+    length: f64,
+    shifts: Vec<f64>,
+}
+
+impl Laid {
+    /// By the shifts at even distances along a piece of some length. \[m\]
+    pub(super) fn new(length: f64, shifts: Vec<f64>) -> Self {
+        Self { length, shifts }
+    }
+
+    /// Averaged over as much as the way itself. \[m\]
+    pub(super) fn at(&self, u: f64, window: Window) -> f64 {
+        let last = (self.shifts.len() - 1) as f64;
+        let (mut sum, mut total) = (0.0, 0.0);
+        for tap in 0..TAPS {
+            let t = (2.0 * tap as f64 + 1.0) / TAPS as f64 - 1.0;
+            let weight = (1.0 - t * t).powi(2);
+            let place = ((u + 0.5 * window.place * t) / self.length * last).clamp(0.0, last);
+            let k = (place as usize).min(self.shifts.len() - 2);
+            let share = place - k as f64;
+            sum += weight * (self.shifts[k] * (1.0 - share) + self.shifts[k + 1] * share);
+            total += weight;
+        }
+        sum / total
     }
 }

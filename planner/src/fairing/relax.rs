@@ -12,11 +12,10 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 use nullsweep_robot::{Jacobian, JointVector};
 use rayon::prelude::*;
 
-use super::averaged::Averaged;
 use super::bend::{Bend, Offset};
 use super::follow::onto;
 use super::guard::Guard;
-use super::piece::Mean;
+use super::piece::{Laid, Mean, Piece};
 use super::window::Windows;
 use crate::band::Band;
 use crate::timing::{Limits, arrivals};
@@ -37,7 +36,7 @@ const PRICE: f64 = 0.3;
 const POWER: f64 = 6.0;
 /// Most steps, and halvings of one.
 const STEPS: usize = 30;
-const HALVINGS: i32 = 3;
+const HALVINGS: usize = 3;
 /// The farthest that a joint's offset goes in one step. \[rad\] or \[m\]
 const FARTHEST: f64 = 0.08;
 /// A step that wins less than this share of the time is the last.
@@ -49,11 +48,11 @@ const BARRIER: f64 = 1e3;
 /// Weight of what the pad is to come over and misses. \[s/m²\]
 const MISSED: f64 = 1e5;
 /// Less room than this is none.
-pub(super) const LEAST_ROOM: f64 = 0.05;
+const LEAST_ROOM: f64 = 0.05;
 
 /// What a piece is bent within.
 pub(super) struct Relaxation<'a> {
-    pub(super) averaged: &'a Averaged,
+    pub(super) piece: &'a Piece,
     pub(super) windows: &'a Windows,
     pub(super) cell: Workcell<'a>,
     pub(super) bed: &'a Bed,
@@ -63,10 +62,8 @@ pub(super) struct Relaxation<'a> {
 }
 
 /// A bent piece as it is gone along.
-pub(super) struct Way {
-    pub(super) bend: Bend,
-    /// Bent aside and laid onto the surface.
-    pub(super) nodes: Vec<Mean>,
+struct Way {
+    bend: Bend,
     q: Vec<JointVector>,
     /// When the fastest motion is there. \[s\]
     times: Vec<f64>,
@@ -74,43 +71,58 @@ pub(super) struct Way {
     merit: f64,
 }
 
-impl Way {
-    /// How long the fastest motion takes. \[s\]
-    pub(super) fn time(&self) -> f64 {
-        self.times.last().copied().unwrap_or_default()
-    }
-}
-
 impl Relaxation<'_> {
-    /// The way that a bend becomes; `None` where the arm cannot follow the one that it is.
-    pub(super) fn relaxed(&self, bend: Bend) -> Option<Way> {
-        let mut way = self.way(bend)?;
+    /// The bend that a bend becomes, and how much less time the piece takes then than without one \[s\];
+    /// `None` where the arm cannot follow the one that it is.
+    pub(super) fn relaxed(&self, mut bend: Bend) -> Option<(Bend, f64)> {
+        for control in 0..bend.controls.len() {
+            if self.windows.room(bend.middle(control)) < LEAST_ROOM {
+                bend.straighten(control);
+            }
+        }
+        let count = self.piece.steps();
+        let at = |k: usize| self.piece.length() * k as f64 / count as f64;
+        let nodes: Vec<(f64, Mean)> =
+            (0..=count).map(|k| (at(k), self.piece.mean(at(k), self.windows.at(at(k))))).collect();
+        let plain = self.way(&nodes, Bend::none(self.piece.length()))?;
+        let mut way = self.way(&nodes, bend)?;
         for _ in 0..STEPS {
-            let step = self.step(&way);
-            let tried = |halvings: i32| {
+            let step = self.step(&nodes, &way);
+            let mut times = 1.0;
+            let mut next = None;
+            for _ in 0..=HALVINGS {
                 let mut bend = way.bend.clone();
                 for (control, step) in bend.controls.iter_mut().zip(&step) {
-                    *control = control.plus(step, 0.5f64.powi(halvings));
+                    *control = control.plus(step, times);
                 }
-                self.way(bend).filter(|next| next.merit < way.merit)
-            };
-            let Some(next) = (0..=HALVINGS).find_map(tried) else { break };
+                next = self.way(&nodes, bend).filter(|next| next.merit < way.merit);
+                if next.is_some() {
+                    break;
+                }
+                times *= 0.5;
+            }
+            let Some(next) = next else { break };
             let is_worth = next.merit < way.merit * (1.0 - WORTH);
             way = next;
             if !is_worth {
                 break;
             }
         }
-        Some(way)
+        let won = plain.times.last()? - way.times.last()?;
+        Some((way.bend, won))
     }
 
     /// The arm brought onto a bent piece.
-    pub(super) fn way(&self, bend: Bend) -> Option<Way> {
-        let nodes = self.averaged.bent(&bend, self.bed);
-        let there = |mean: &Mean| {
-            onto(self.cell, &mean.pose()?, mean.q()).filter(|q| self.cell.arm.within_margins(q))
+    fn way(&self, nodes: &[(f64, Mean)], bend: Bend) -> Option<Way> {
+        let moved: Vec<(f64, Mean)> =
+            nodes.iter().map(|(u, mean)| (*u, mean.moved(&bend.at(*u)))).collect();
+        let shifts = moved.par_iter().map(|(_, mean)| mean.laid(self.bed).unwrap_or(0.0)).collect();
+        let laid = Laid::new(self.piece.length(), shifts);
+        let there = |(u, mean): &(f64, Mean)| {
+            let pose = mean.pose(laid.at(*u, self.windows.at(*u)))?;
+            onto(self.cell, &pose, mean.q).filter(|q| self.cell.arm.within_margins(q))
         };
-        let q: Vec<JointVector> = nodes.par_iter().map(there).collect::<Option<_>>()?;
+        let q: Vec<JointVector> = moved.par_iter().map(there).collect::<Option<_>>()?;
         if q.windows(2).any(|w| w[0] == w[1]) {
             return None;
         }
@@ -118,32 +130,31 @@ impl Relaxation<'_> {
         let costs: f64 = (0..bend.controls.len()).map(|k| self.deviation(&bend, k)).sum();
         let pad = self.cell.tool.on(self.cell.arm);
         let short = |guard: &Guard| {
-            let pose = pad.pose(&q[self.averaged.nearest(guard.u)]);
+            let pose = pad.pose(&q[self.node(guard.u)]);
             guard.short(&pose, self.cell.tool).norm_squared()
         };
         let missed: f64 = self.guards.iter().map(short).sum();
         let merit = times.last()? + costs + MISSED * missed;
-        merit.is_finite().then_some(Way { bend, nodes, q, times, merit })
+        merit.is_finite().then_some(Way { bend, q, times, merit })
     }
 
     /// What a control's deviation costs. \[s\]
     fn deviation(&self, bend: &Bend, control: usize) -> f64 {
-        let ([room, free], price) = self.price(bend, control);
+        let (room, price) = self.price(bend, control);
         let Offset { q, twist } = bend.controls[control];
-        let pad = self.stiffness(self.nearest(bend, control), room);
+        let pad = self.stiffness(bend.middle(control), room);
         let joints: f64 = q.iter().map(|q| q * q).sum();
-        price * ((twist.transpose() * pad * twist)[0] + joints * aside(free))
+        price * ((twist.transpose() * pad * twist)[0] + joints * aside(room))
     }
 
-    /// The rooms of pad and joints, and what a deviation costs at a control.
-    fn price(&self, bend: &Bend, control: usize) -> ([f64; 2], f64) {
-        let rooms = self.windows.room(bend.middle(control));
-        (rooms.map(|room| room.max(LEAST_ROOM)), PRICE * bend.spacing())
+    fn price(&self, bend: &Bend, control: usize) -> (f64, f64) {
+        let room = self.windows.room(bend.middle(control)).max(LEAST_ROOM);
+        (room, PRICE * bend.spacing())
     }
 
     /// The squares of a twist's parts against what the pad may be off, in the root frame.
-    fn stiffness(&self, node: usize, room: f64) -> Matrix6<f64> {
-        let into = self.averaged.mean(node).axis();
+    fn stiffness(&self, u: f64, room: f64) -> Matrix6<f64> {
+        let into = self.piece.mean(u, self.windows.at(u)).axis();
         let normal = into * into.transpose();
         let beside = Matrix3::identity() - normal;
         let of = |along: f64, across: f64| {
@@ -156,30 +167,35 @@ impl Relaxation<'_> {
     }
 
     /// Where the offsets are to go: the step of Newton's method.
-    fn step(&self, way: &Way) -> Vec<Offset> {
+    fn step(&self, nodes: &[(f64, Mean)], way: &Way) -> Vec<Offset> {
         let dof = self.cell.arm.limits().len();
         let controls = way.bend.controls.len();
         let size = controls * dof;
         let mut matrix = Band::zero(size, (CONTROLS * dof).max(1));
         let mut right = vec![0.0; size];
-        for k in 1..self.averaged.count().saturating_sub(1) {
-            self.add_limits(way, k, (&mut matrix, &mut right));
+        for k in 1..nodes.len().saturating_sub(1) {
+            self.add_limits(
+                way,
+                [nodes[k - 1].0, nodes[k].0, nodes[k + 1].0],
+                k,
+                (&mut matrix, &mut right),
+            );
         }
-        let jacobians: Vec<Jacobian> = (0..controls).map(|c| self.jacobian(way, c)).collect();
+        let jacobians: Vec<Jacobian> =
+            (0..controls).map(|c| self.jacobian(nodes, way, c)).collect();
         for (control, jacobian) in jacobians.iter().enumerate() {
-            let node = self.nearest(&way.bend, control);
-            let ([room, free], price) = self.price(&way.bend, control);
-            let is_fixed = self.windows.room(way.bend.middle(control))[1] < LEAST_ROOM;
-            let pad = self.stiffness(node, room) * price;
+            let (room, price) = self.price(&way.bend, control);
+            let is_fixed = self.windows.room(way.bend.middle(control)) < LEAST_ROOM;
+            let pad = self.stiffness(way.bend.middle(control), room) * price;
             let back = jacobian.transpose() * pad;
             let (square, pull) = (back * jacobian, back * way.bend.controls[control].twist);
-            let q = way.q[node];
+            let q = way.q[self.nearest(&way.bend, control)];
             for j in 0..dof {
                 let row = control * dof + j;
                 for other in j..dof {
                     matrix.add(row, control * dof + other, square[(j, other)]);
                 }
-                let joint = price * aside(free);
+                let joint = price * aside(room);
                 matrix.add(row, row, joint + if is_fixed { f64::MAX.sqrt() } else { 1e-9 });
                 right[row] -= pull[j] + joint * way.bend.controls[control].q[j];
                 let (lower, upper) = self.cell.arm.margined_limits()[j];
@@ -200,7 +216,8 @@ impl Relaxation<'_> {
             let mut twist: Vector6<f64> =
                 (0..dof).map(|j| jacobians[control].column(j) * q[j]).sum();
             // The pad is laid onto the surface again.
-            let into = self.averaged.mean(self.nearest(&way.bend, control)).axis();
+            let u = way.bend.middle(control);
+            let into = self.piece.mean(u, self.windows.at(u)).axis();
             let shift: Vector3<f64> = twist.fixed_rows::<3>(0).into();
             twist.fixed_rows_mut::<3>(0).copy_from(&(shift - into * shift.dot(&into)));
             Offset { q, twist }
@@ -209,9 +226,14 @@ impl Relaxation<'_> {
     }
 
     /// Adds what the joints' velocities and accelerations at a node cost.
-    fn add_limits(&self, way: &Way, k: usize, (matrix, right): (&mut Band, &mut [f64])) {
+    fn add_limits(
+        &self,
+        way: &Way,
+        places: [f64; 3],
+        k: usize,
+        (matrix, right): (&mut Band, &mut [f64]),
+    ) {
         let dof = self.cell.arm.limits().len();
-        let places = [k - 1, k, k + 1].map(|node| self.averaged.place(node));
         let (before, after) = (way.times[k] - way.times[k - 1], way.times[k + 1] - way.times[k]);
         let both = before + after;
         let rates = [
@@ -260,9 +282,14 @@ impl Relaxation<'_> {
         }
     }
 
-    /// The node nearest to where a control weighs most.
     fn nearest(&self, bend: &Bend, control: usize) -> usize {
-        self.averaged.nearest(bend.middle(control))
+        self.node(bend.middle(control))
+    }
+
+    /// The node nearest to a place.
+    fn node(&self, u: f64) -> usize {
+        let last = self.piece.steps();
+        ((u / self.piece.length() * last as f64).round() as usize).min(last)
     }
 
     /// Adds what it costs that the pad does not come over what it must.
@@ -270,7 +297,7 @@ impl Relaxation<'_> {
         let dof = self.cell.arm.limits().len();
         let pad = self.cell.tool.on(self.cell.arm);
         for guard in self.guards {
-            let pose = pad.pose(&way.q[self.averaged.nearest(guard.u)]);
+            let pose = pad.pose(&way.q[self.node(guard.u)]);
             let short = guard.short(&pose, self.cell.tool);
             for axis in 0..2 {
                 if short[axis] == 0.0 {
@@ -304,8 +331,8 @@ impl Relaxation<'_> {
     }
 
     /// Of the pad's centre at a control.
-    fn jacobian(&self, way: &Way, control: usize) -> Jacobian {
-        let near = self.nearest(&way.bend, control);
+    fn jacobian(&self, nodes: &[(f64, Mean)], way: &Way, control: usize) -> Jacobian {
+        let near = self.nearest(&way.bend, control).min(nodes.len() - 1);
         let (tip, mut jacobian) = self.cell.arm.tip_pose_and_jacobian(&way.q[near]);
         let centre: Isometry3<f64> = tip * self.cell.tool.contact_in_tip();
         let arm = centre.translation.vector - tip.translation.vector;
@@ -319,29 +346,9 @@ impl Relaxation<'_> {
 }
 
 /// Most controls that bend three nodes in a row.
-const CONTROLS: usize = 6;
+const CONTROLS: usize = 5;
 
 /// What the joints pay for being off their average: nothing where there is all the room.
 fn aside(room: f64) -> f64 {
     (1.0 / (room * room) - 1.0) / (ASIDE * ASIDE)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::fairing::averaged::steps;
-
-    #[test]
-    fn three_nodes_in_a_row_are_bent_by_few_controls_however_long_a_piece_is() {
-        for length in (1..3000).map(|k| 0.0007 * f64::from(k)) {
-            let (bend, count) = (Bend::none(length), steps(length));
-            let place = |node: usize| length * node as f64 / count as f64;
-            for k in 1..count {
-                let near = [k - 1, k, k + 1].map(place);
-                let all = near.iter().flat_map(|u| bend.weights(*u)).map(|(control, _)| control);
-                let (first, last) = all.fold((usize::MAX, 0), |(a, b), c| (a.min(c), b.max(c)));
-                assert!(first > last || last - first < CONTROLS, "{length} m at {k}");
-            }
-        }
-    }
 }

@@ -33,18 +33,15 @@ pub(super) struct Windows {
     pad: Shares,
     /// Of the joints: where the pad goes, and so what it sweeps, does not depend on them.
     joints: Shares,
-    /// Of what the pad may be bent aside.
+    /// Of what the way may be bent aside.
     bend: Shares,
-    /// Of what the joints may be bent aside.
-    free: Shares,
 }
 
 impl Windows {
     /// The widest, along a piece of some length. \[m\]
     pub(super) fn new(length: f64) -> Self {
         let [pad, joints] = std::array::from_fn(|_| Shares::new(length, STEEPEST));
-        let [bend, free] = std::array::from_fn(|_| Shares::new(length, STEEPEST_ROOM));
-        Self { pad, joints, bend, free }
+        Self { pad, joints, bend: Shares::new(length, STEEPEST_ROOM) }
     }
 
     /// At a place of it. At its ends there is none, so that it ends where it did.
@@ -56,29 +53,21 @@ impl Windows {
         }
     }
 
-    /// The shares of the room there is that pad and joints may be bent aside by at a place.
-    pub(super) fn room(&self, u: f64) -> [f64; 2] {
-        [self.bend.share(u), self.free.share(u)]
+    /// The share of the room there is that the way may be bent aside by at a place.
+    pub(super) fn room(&self, u: f64) -> f64 {
+        self.bend.share(u)
     }
 
-    /// Halves the pad's room around some places, where none is left the joints', and where that is none
-    /// either a little farther around them; whether any was left to halve.
+    /// Halves that room around some places, where none is left a little farther around them; whether any
+    /// was left to halve.
     pub(super) fn narrow_room(&mut self, places: &[f64]) -> bool {
         (0..=AROUND).any(|k| {
             let aside = f64::from(k) * ROUNDED;
             let around = places.iter().flat_map(|u| [(u - aside).max(0.0), u + aside]);
             let mut around: Vec<f64> = around.collect();
             around.sort_by(f64::total_cmp);
-            let spent: Vec<f64> =
-                around.iter().copied().filter(|u| self.bend.share(*u) < NARROWEST).collect();
-            let joints = self.free.narrow(&spent, 0.0);
-            self.bend.narrow(&around, 0.0) || joints
+            self.bend.narrow(&around, 0.0)
         })
-    }
-
-    /// Halves the pad's room around some places; whether any was left to halve.
-    pub(super) fn narrow_pads_room(&mut self, places: &[f64]) -> bool {
-        self.bend.narrow(places, 0.0)
     }
 
     /// Halves the pad's windows around some places, down to `least` of the widest; whether any was left
