@@ -73,7 +73,7 @@ fn libraries_stay_in_their_rooms() {
 }
 
 #[test]
-fn plans_are_the_same_on_every_processor() {
+fn what_computes_plans_rounds_by_libm() {
     let offences = roundings::check(&TREE, house::ROUNDED);
     expect_none(offences, "Call the function of `libm`; four at once are in robot/src/lanes.rs.");
 }
